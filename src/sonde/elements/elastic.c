@@ -270,11 +270,11 @@ sonde_status sonde_elastic_solve(const sonde_elastic *e, sonde_elastic_scratch *
                             .precondition = precondition,
                             .user = s};
   const sonde_pcg_vectors vectors = {v, v + n, v + 2 * n, v + 3 * n};
-  const sonde_pcg_goal goal = {.relative = 1e-13, .max_iterations = 300, .from_zero = true};
+  const sonde_pcg_goal goal = {.relative = e->accuracy, .max_iterations = 300, .from_zero = true};
   sonde_pcg_result result = sonde_pcg(&a, right, u, &vectors, &goal);
   for (size_t k = 0; k < n; ++k)
     if (s->imposed[k / 3]) u[k] = start[k];
-  if (!(result.residual <= 1e-10 * result.reference))
+  if (!(result.residual <= fmax(1e-10, e->accuracy) * result.reference))
     return sonde_fail(error, SONDE_CONVERGENCE,
                       "the residual stays at %.2g of the load after %u steps",
                       result.residual / result.reference, result.iterations);

@@ -30,6 +30,7 @@ typedef struct sonde_elastic {
   double *volume;             // [tetrahedra] m3
   double *young_pa;           // [tetrahedra]
   double poisson, skin_n_m;
+  double accuracy; // of a solve: residual over the load; 1e-13 unless set anew
   sonde_patches patches;
   double *patch_lambda;         // [patches] Pa
   uint32_t *row_start, *column; // blocks of the stiffness matrix, both triangles

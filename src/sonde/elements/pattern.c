@@ -111,7 +111,7 @@ sonde_status sonde_elastic_create(const sonde_elastic_def *def, sonde_elastic **
   *elastic = NULL;
   sonde_elastic *e = SONDE_NEW(sonde_elastic, 1);
   if (!e) return sonde_fail_memory(error);
-  e->mesh = m;
+  e->mesh = m, e->accuracy = 1e-13;
   e->unknown = SONDE_NEW(uint32_t, m->node_count);
   e->node = SONDE_NEW(uint32_t, m->node_count);
   e->held = SONDE_NEW(uint8_t, m->node_count);
