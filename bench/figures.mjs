@@ -79,6 +79,14 @@ const GROUPS = {
       return { ...values, least: Math.min(...all), most: Math.max(...all) }
     },
   },
+  haptics: {
+    sources: ['src/sonde/haptics', 'app/validate_haptics.c', ...engine],
+    measure(bin) {
+      const values = {}
+      for (const [name, entry] of Object.entries(JSON.parse(found(bin, 'sonde', 'validate', 'haptics', '--json')))) values[name] = entry.value
+      return values
+    },
+  },
   operators: {
     sources: ['src/sonde-exam', 'src/sonde/interior', ...engine, 'data/cases', 'data/protocols'],
     measure(bin) {
