@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LAYERS = 400, SHADES = 48, DEEPEST = 12, FIRST_ROOM = 4096 };
+enum { LAYERS = 1000, SHADES = 48, DEEPEST = 12, FIRST_ROOM = 4096 };
 static const double PIECE_PX = 22; // longest edge of a piece
 
 typedef struct piece {
@@ -128,15 +128,21 @@ void painter_face(painter *p, const sonde_vec3 corner_m[3], uint32_t rgb, double
   split_face(p, corner_m, rgb, opacity, 0);
 }
 
-void painter_lit_face(painter *p, const sonde_vec3 corner_m[3], uint32_t rgb, double opacity) {
+static sonde_vec3 normal_of(const sonde_vec3 corner_m[3]) {
+  return unit(cross(madd(corner_m[1], -1, corner_m[0]), madd(corner_m[2], -1, corner_m[0])));
+}
+
+bool painter_sees(const painter *p, const sonde_vec3 corner_m[3]) {
   const painter_camera *c = &p->camera;
-  sonde_vec3 normal =
-      unit(cross(madd(corner_m[1], -1, corner_m[0]), madd(corner_m[2], -1, corner_m[0])));
   sonde_vec3 to_eye = c->toward;
   if (isfinite(c->distance_m))
     to_eye = madd(madd(c->centre_m, c->distance_m, c->toward), -1, corner_m[0]);
-  if (!(dot(normal, to_eye) > 0)) return;
-  double lit = fmin(fmax(dot(normal, p->light), 0) * SHADES, SHADES - 1);
+  return dot(normal_of(corner_m), to_eye) > 0;
+}
+
+void painter_lit_face(painter *p, const sonde_vec3 corner_m[3], uint32_t rgb, double opacity) {
+  if (!painter_sees(p, corner_m)) return;
+  double lit = fmin(fmax(dot(normal_of(corner_m), p->light), 0) * SHADES, SHADES - 1);
   double bright = 0.5 + 0.58 * (uint32_t)lit / (SHADES - 1);
   uint32_t shaded = 0;
   for (int k = 16; k >= 0; k -= 8)

@@ -32,7 +32,9 @@ sonde_status painter_create(const painter_camera *camera, painter **made, sonde_
 void painter_destroy(painter *p);
 // A face of one colour, cut into small pieces that are ordered each by itself.
 void painter_face(painter *p, const sonde_vec3 corner_m[3], uint32_t rgb, double opacity);
-// The same when the face is turned to the viewer, lit from above the viewer's left shoulder.
+// Whether a face is turned to the viewer: its corners run counter-clockwise.
+bool painter_sees(const painter *p, const sonde_vec3 corner_m[3]);
+// Paints a face that is turned to the viewer, lit from above the viewer's left shoulder.
 void painter_lit_face(painter *p, const sonde_vec3 corner_m[3], uint32_t rgb, double opacity);
 // A line, ordered as if it lay `nearer_m` towards the viewer.
 void painter_line(painter *p, sonde_vec3 from_m, sonde_vec3 to_m, uint32_t rgb, double width_px,

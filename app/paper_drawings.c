@@ -36,24 +36,28 @@ static sonde_status draw_probe(sonde_file *file, const sonde_probe *probe, paint
   for (uint32_t f = 0; f < hull->face_count && !status; ++f) {
     const uint32_t *v = hull->faces[f];
     const sonde_vec3 corner[3] = {hull->vertices[v[0]], hull->vertices[v[1]], hull->vertices[v[2]]};
+    if (!painter_sees(brush, corner)) continue;
     bool contact = corner[0].z > -FACE_M && corner[1].z > -FACE_M && corner[2].z > -FACE_M;
-    painter_lit_face(brush, corner, contact ? 0xd55e00 : 0xb8c4ce, 1);
+    if (contact) // in its own colour, whatever the light
+      painter_face(brush, corner, 0xe58a4c, 1);
+    else
+      painter_lit_face(brush, corner, 0xb8c4ce, 1);
     // Edges between faces of different planes.
     for (int k = 0; k < 3; ++k) {
       sonde_vec3 a = corner[k], b = corner[(k + 1) % 3], d = add(b, -1, a);
       int across = (fabs(d.x) > FACE_M) + (fabs(d.y) > FACE_M) + (fabs(d.z) > FACE_M);
-      if (across == 1) painter_line(brush, a, b, 0x334455, 1.1, 1e-3);
+      if (across == 1) painter_line(brush, a, b, 0x334455, 1.1, 5e-3);
     }
   }
   if (!status) status = painter_paint(brush, file, error);
 
   // The sides of the contact face, measured beside it.
-  double hx = probe->half_x_m, hy = probe->half_y_m, out = 4e-3, a[2], b[2];
+  double hx = probe->half_x_m, hy = probe->half_y_m, out = 2.5e-3, a[2], b[2];
   const struct {
     sonde_vec3 from, to;
     double size_mm;
-  } side[2] = {{{-hx, -hy - out, 0}, {hx, -hy - out, 0}, 2e3 * hx},
-               {{-hx - out, -hy, 0}, {-hx - out, hy, 0}, 2e3 * hy}};
+  } side[2] = {{{-hx, hy + out, 0}, {hx, hy + out, 0}, 2e3 * hx},
+               {{hx + out, -hy, 0}, {hx + out, hy, 0}, 2e3 * hy}};
   for (int k = 0; k < 2 && !status; ++k) {
     char words[32];
     painter_project(&camera, side[k].from, a);
@@ -63,7 +67,7 @@ static sonde_status draw_probe(sonde_file *file, const sonde_probe *probe, paint
     sonde_svg_put_circle(file, a[0], a[1], 1.6, "fill='#222'");
     sonde_svg_put_circle(file, b[0], b[1], 1.6, "fill='#222'");
     snprintf(words, sizeof words, "%g mm", side[k].size_mm);
-    sonde_svg_put_text(file, 0.5 * (a[0] + b[0]) + (k ? -8 : 4), 0.5 * (a[1] + b[1]) + (k ? 4 : 17),
+    sonde_svg_put_text(file, 0.5 * (a[0] + b[0]) + (k ? -8 : 6), 0.5 * (a[1] + b[1]) + (k ? 6 : 15),
                        k ? "class='tick end'" : "class='tick'", words);
   }
   painter_destroy(brush);
@@ -83,7 +87,7 @@ static sonde_status draw_probes(paper *p, sonde_error *error) {
     char words[96];
     painter_box box = {k ? 250 : 20, 56, k ? 490 : 230, 320};
     status = sonde_probe_create(NAME[k], &probe, error);
-    if (!status) status = draw_probe(file, &probe, box, 3400, error);
+    if (!status) status = draw_probe(file, &probe, box, 4000, error);
     area_mm2[k] = 4e6 * probe.half_x_m * probe.half_y_m;
     snprintf(words, sizeof words, "%s, \"%s\", %.0f mm\u00b2", WORDS[k], NAME[k], area_mm2[k]);
     if (!status) sonde_svg_put_text(file, box.left + box.width / 2, 414, "class='middle'", words);
@@ -128,14 +132,17 @@ static void draw_damper(painter *brush, sonde_vec3 a, sonde_vec3 b, sonde_vec3 a
   painter_line(brush, add(a, 0.8, way), add(from, 0.8, way), rgb, 1, 0);
 }
 
-// Nodes of the mesh at most two edges away from the one nearest to a point. @return their number
+// Nodes of the mesh at most two edges away from the regular one nearest to a point. @return their
+// number
 static uint32_t patch_around(const sonde_model *m, sonde_vec3 middle, uint32_t *node,
                              uint32_t room) {
+  enum { REGULAR = 6 }; // neighbours of a node within a regular part of the mesh
   uint32_t count = 1, ring = 0;
   node[0] = 0;
   double least = INFINITY;
   for (uint32_t i = 0; i < m->surface.vertex_count; ++i) {
     sonde_vec3 d = add(m->surface.vertices[i], -1, middle);
+    if (m->topology.start[i + 1] - m->topology.start[i] != REGULAR) continue;
     if (vec_dot(d, d) < least) least = vec_dot(d, d), node[0] = i;
   }
   for (int rings = 0; rings < 2; ++rings) {
@@ -166,15 +173,16 @@ static sonde_status draw_layers(paper *p, sonde_error *error) {
   uint32_t node[ROOM], count = patch_around(m, p->central->position_m, node, ROOM), springs = 0;
   sonde_vec3 normal = m->normal[node[0]], points[2 * ROOM];
   double edge_m = m->edge_rest_m[m->topology.neighbour_edge[m->topology.start[node[0]]]];
-  double deep_m = 4.2 * edge_m;
+  double deep_m = 2.6 * edge_m;
   assert(count > 6);
   for (uint32_t k = 0; k < count; ++k) {
     points[k] = m->surface.vertices[node[k]];
     points[count + k] = add(points[k], -deep_m, m->normal[node[k]]);
   }
-  sonde_vec3 toward = add(add(normal, 1.9, unit(cross(p->central->v, normal))), 0.9, p->central->v);
+  sonde_vec3 toward =
+      add(add(normal, 1.25, unit(cross(p->central->v, normal))), 0.55, p->central->v);
   painter_camera camera = painter_look(toward, normal, points[0], 16 * edge_m);
-  painter_fit(&camera, points, 2 * count, (painter_box){40, 60, 520, 400});
+  painter_fit(&camera, points, 2 * count, (painter_box){40, 56, 530, 420});
   painter *brush = NULL;
   sonde_file *file = NULL;
   sonde_status status = paper_figure_begin(p, 6, TITLE, 800, 500, &file, error);
@@ -182,19 +190,24 @@ static sonde_status draw_layers(paper *p, sonde_error *error) {
 
   // Surface: a spring and a damper along every edge; below: a normal spring at every node.
   sonde_vec3 middle = points[0];
+  double farthest = -INFINITY;
   for (uint32_t i = 0; i < count && !status; ++i)
     for (uint32_t k = m->topology.start[node[i]]; k < m->topology.start[node[i] + 1]; ++k) {
       uint32_t j = 0;
       while (j < count && node[j] != m->topology.neighbour[k]) ++j;
       if (j == count || node[j] < node[i]) continue;
       sonde_vec3 aside = unit(cross(m->normal[node[i]], add(points[j], -1, points[i])));
-      draw_spring(brush, points[i], points[j], aside, 0.07 * edge_m, 7, 0x0072b2, 1.1);
-      draw_damper(brush, points[i], points[j], aside, 0.17 * edge_m, 0.045 * edge_m, 0x56a0d8);
-      if (!springs++) middle = add(points[i], 0.5, add(points[j], -1, points[i]));
+      draw_spring(brush, points[i], points[j], aside, 0.055 * edge_m, 9, 0x0072b2, 1.4);
+      draw_damper(brush, points[i], points[j], aside, 0.16 * edge_m, 0.04 * edge_m, 0x009e73);
+      springs++;
+      double at[2];
+      sonde_vec3 half = add(points[i], 0.5, add(points[j], -1, points[i]));
+      painter_project(&camera, half, at);
+      if (at[0] > farthest) farthest = at[0], middle = half;
     }
   for (uint32_t i = 0; i < count && !status; ++i) {
     sonde_vec3 foot = points[count + i];
-    draw_spring(brush, points[i], foot, camera.right, 0.14 * edge_m, 10, 0xd55e00, 1.5);
+    draw_spring(brush, points[i], foot, camera.right, 0.1 * edge_m, 8, 0xd55e00, 1.5);
     // An arrow across: its stiffness depends on the deformation.
     sonde_vec3 centre = add(points[i], 0.5, add(foot, -1, points[i]));
     sonde_vec3 low = add(add(centre, -0.3 * edge_m, camera.right), -0.32 * edge_m, camera.up);

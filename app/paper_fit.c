@@ -237,7 +237,7 @@ static void judge_limit(paper *p) {
 // ---- the start of stage 2
 
 static sonde_status judge_start(paper *p, sonde_error *error) {
-  uint32_t starts = p->quick ? 4 : 40, same = 0, failed = 0;
+  uint32_t starts = p->quick ? 4 : 40, same = 0, worse = 0, failed = 0;
   double worst = 0, iterations = 0, warm_cost = p->fit.stage2.all.rmse_n;
   sonde_fit_def def = p->fit_def;
   def.stages = 2, def.cold_start = true;
@@ -249,7 +249,7 @@ static sonde_status judge_start(paper *p, sonde_error *error) {
     if (!status) {
       double ratio = r.stage2.all.rmse_n / warm_cost;
       worst = fmax(worst, ratio);
-      same += r.stage2_converged && fabs(ratio - 1) < 1e-3;
+      same += fabs(ratio - 1) <= 0.01, worse += ratio > 1.01;
       failed += !r.stage2_converged;
       iterations += (double)r.stage2_iterations / starts;
     }
@@ -264,16 +264,18 @@ static sonde_status judge_start(paper *p, sonde_error *error) {
   if (status) return status;
   paper_samples(c, starts, "cold starts");
   paper_value(c, "same_optimum", same);
+  paper_value(c, "worse", worse);
   paper_value(c, "not_converged", failed);
   paper_value(c, "worst_rmse_ratio", worst);
   paper_value(c, "cold_iterations", iterations);
   paper_value(c, "warm_iterations", p->fit.stage2_iterations);
-  paper_say(c, same < starts ? PAPER_HOLDS : PAPER_IN_PART,
-            "%u of %u cold starts end in the optimum that stage 1 leads to; the worst leaves %.2f "
-            "times its error. From stage 1 it takes %u iterations, from cold %.0f. %s",
-            same, starts, worst, p->fit.stage2_iterations, iterations,
-            same < starts ? "There are minima to avoid, and stage 1 avoids them."
-                          : "The start saves work; there were no other minima to avoid.");
+  paper_say(
+      c, worse ? PAPER_HOLDS : PAPER_IN_PART,
+      "%u of %u cold starts end within 1 %% of the error that stage 1 leads to, %u above it, the "
+      "worst at %.3f times. From stage 1 it takes %u iterations, from cold %.0f. %s",
+      same, starts, worse, worst, p->fit.stage2_iterations, iterations,
+      worse ? "There are minima to avoid, and stage 1 avoids them."
+            : "The start saves work; no other minimum was met.");
   return SONDE_OK;
 }
 

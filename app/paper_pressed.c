@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 360, SHADES = 24 };
-static const double SHOWN_N = 16;
+enum { SIDE = 360, SHADES = 32 };
+static const double SHOWN_N = 20;
 
 // A slow press along the beam from the skin at rest, to a force or a depth.
 static sonde_status press(const paper *p, settled *s, sonde_pose start, double depth_m,
@@ -19,6 +19,7 @@ static sonde_status press(const paper *p, settled *s, sonde_pose start, double d
   sonde_path_def def = sonde_path_def_default();
   def.force_n = force_n;
   def.relative_residual = 1e-6;
+  if (p->quick) def.tolerance = 0.05, def.relative_residual = 1e-4;
   sonde_status status =
       sonde_settle_path(s->state, &s->probe, start, pose_shift(start, depth_m, pose_axis(start, 2)),
                         &def, &p->progress, &s->path, error);
@@ -28,15 +29,18 @@ static sonde_status press(const paper *p, settled *s, sonde_pose start, double d
 
 // ---- figure 8
 
-// Dark blue for none to yellow for the most, in equal steps of lightness.
+// The skin's own colour for none, then dark violet to yellow for the most.
 static uint32_t colour_of(double share) {
   static const double STOP[][3] = {
       {68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}};
-  double at = 4 * fmin(fmax(share, 0), 0.9999);
+  static const double SKIN[] = {217, 195, 172}, BLEND = 0.16;
+  double at = 4 * fmin(fmax(share, 0), 0.9999), mixed = fmin(share / BLEND, 1);
   int k = (int)at;
   uint32_t rgb = 0;
-  for (int c = 0; c < 3; ++c)
-    rgb = rgb << 8 | (uint32_t)lround(STOP[k][c] + (at - k) * (STOP[k + 1][c] - STOP[k][c]));
+  for (int c = 0; c < 3; ++c) {
+    double tint = STOP[k][c] + (at - k) * (STOP[k + 1][c] - STOP[k][c]);
+    rgb = rgb << 8 | (uint32_t)lround(SKIN[c] + mixed * (tint - SKIN[c]));
+  }
   return rgb;
 }
 
@@ -52,12 +56,10 @@ static sonde_status draw_thigh(const settled *s, const sonde_site *site, sonde_f
   const double FACE_M = 1e-6;
   const sonde_model *m = s->model;
   const sonde_vec3 *x = sonde_state_positions(s->state);
-  sonde_vec3 n = site->normal, toward = {n.x + 0.35 * site->v.x - 1.1 * site->u.x,
-                                         n.y + 0.35 * site->v.y - 1.1 * site->u.y,
-                                         n.z + 0.35 * site->v.z - 1.1 * site->u.z};
-  toward = (sonde_vec3){0.75 * n.x + 0.9 * site->v.x - 0.35 * site->u.x,
-                        0.75 * n.y + 0.9 * site->v.y - 0.35 * site->u.y,
-                        0.75 * n.z + 0.9 * site->v.z - 0.35 * site->u.z};
+  sonde_vec3 n = site->normal;
+  sonde_vec3 toward = {0.75 * n.x + 0.9 * site->v.x - 0.35 * site->u.x,
+                       0.75 * n.y + 0.9 * site->v.y - 0.35 * site->u.y,
+                       0.75 * n.z + 0.9 * site->v.z - 0.35 * site->u.z};
   painter_camera camera = painter_look(toward, n, site->position_m, 0.8);
   painter_fit(&camera, x, m->surface.vertex_count, (painter_box){14, 60, 420, 380});
   painter *brush = NULL;
@@ -68,7 +70,7 @@ static sonde_status draw_thigh(const settled *s, const sonde_site *site, sonde_f
     double share = 0;
     for (int k = 0; k < 3; ++k) share += indentation(m, x, v[k]) / (3 * deepest_m);
     uint32_t level = (uint32_t)fmin(fmax(share, 0) * SHADES, SHADES - 1);
-    painter_lit_face(brush, corner, level ? colour_of((level + 0.5) / SHADES) : 0xd9c3ac, 1);
+    painter_lit_face(brush, corner, colour_of(level / (SHADES - 1.0)), 1);
   }
   const sonde_mesh *hull = &s->probe.body.hull;
   for (uint32_t f = 0; f < hull->face_count && !status; ++f) {
@@ -100,9 +102,9 @@ static sonde_status draw_thigh(const settled *s, const sonde_site *site, sonde_f
 static void draw_scale(sonde_file *file, double left, double top, double deepest_m) {
   char words[48], look[40];
   for (int k = 0; k < SHADES; ++k) {
-    double x = left + 8 * k;
-    const double box[4][2] = {{x, top}, {x + 8, top}, {x + 8, top + 10}, {x, top + 10}};
-    snprintf(look, sizeof look, "fill='#%06x'", k ? colour_of((k + 0.5) / SHADES) : 0xd9c3ac);
+    double x = left + 6 * k;
+    const double box[4][2] = {{x, top}, {x + 6, top}, {x + 6, top + 10}, {x, top + 10}};
+    snprintf(look, sizeof look, "fill='#%06x'", colour_of(k / (SHADES - 1.0)));
     sonde_svg_put_outlines(file, box, 4, 4, look);
   }
   for (int k = 0; k <= 2; ++k) {
@@ -191,8 +193,8 @@ static sonde_status judge_vein(paper *p, settled *s, sonde_error *error) {
   paper_value(c, "force_n", s->force_n);
   for (int k = 0; k < 4; ++k) paper_value(c, KEY[k], area[k]);
   paper_value(c, "artery_area", artery);
-  bool ordered = area[0] < area[1] && area[1] < area[3] && area[0] < 0.2 && area[3] > 0.7;
-  paper_say(c, ordered && artery > 0.8 ? PAPER_HOLDS : PAPER_IN_PART,
+  bool ordered = area[0] < area[1] && area[1] < area[3] && area[0] < 0.1 && area[3] > 0.7;
+  paper_say(c, ordered && artery > 0.9 ? PAPER_HOLDS : PAPER_IN_PART,
             "At %.1f N the healthy vein keeps %.0f %% of its area, with a mural clot %.0f %%, an "
             "acute one %.0f %%, a chronic one %.0f %%; the artery keeps %.0f %%.",
             s->force_n, 100 * area[0], 100 * area[1], 100 * area[2], 100 * area[3], 100 * artery);
@@ -244,7 +246,7 @@ static sonde_status judge_force(paper *p, settled *s, sonde_error *error) {
 
 // How near a node comes to its asymptote under a force that no exam reaches.
 static sonde_status judge_limit(paper *p, settled *s, sonde_error *error) {
-  const double FORCE_N = p->quick ? 40 : 100;
+  const double FORCE_N = p->quick ? 25 : 100;
   sonde_state_reset(s->state);
   sonde_error ignored = {0};
   sonde_status status = press(p, s, sonde_site_pose(p->central, 0), 0.06, FORCE_N, &ignored);

@@ -41,7 +41,7 @@ await writeFile(path.join(out, "index.html"), await read("index.html"));
 // A report is one file: template, style and script. The marks of title and data stay for the program.
 const report = await bundle("report/main.ts", "report.js");
 const parts = {
-  STYLE: `${await read("src/report/style.css")}\n${await read("src/report/exam.css")}`,
+  STYLE: `${await read("src/report/style.css")}\n${await read("src/report/exam.css")}\n${await read("src/report/paper.css")}`,
   FIGURE_STYLE: await read("src/report/figure.css"),
   SCRIPT: `${await readFile(path.join(out, "report.js"), "utf8")}\n${await licences(report.metafile.inputs)}`,
 };

@@ -3,10 +3,11 @@
 import { exam } from "./exam";
 import { fit } from "./fit";
 import { h } from "./dom";
+import { paper } from "./paper";
 import { plain } from "./plain";
 import { scene } from "./scene";
 
-const VIEWS: Record<string, (data: unknown) => void> = { fit, scene, exam };
+const VIEWS: Record<string, (data: unknown) => void> = { fit, scene, exam, paper };
 
 try {
   const data = JSON.parse(document.getElementById("report")?.textContent ?? "") as { kind?: string };
