@@ -1,11 +1,11 @@
 // The material's functions over a batch: every lane gets a deformation gradient and a change of it.
 #include "elements/material.h"
 
-void BY_REAL(material_batch)(sonde_material law, double mu, double lambda, const double *f,
+void BY_REAL(material_batch)(sonde_elastic_material law, double mu, double lambda, const double *f,
                              const double *df, double *out);
 
 // f, df [SONDE_BATCH][9]; out [SONDE_BATCH][19]: energy, stress, its change.
-void BY_REAL(material_batch)(sonde_material law, double mu, double lambda, const double *f,
+void BY_REAL(material_batch)(sonde_elastic_material law, double mu, double lambda, const double *f,
                              const double *df, double *out) {
   reals x[9], dx[9], p[9], dp[9], m = all((real)mu), l = all((real)lambda);
   for (int k = 0; k < 9; ++k)

@@ -49,6 +49,7 @@ int main(int argc, char **argv) {
   sonde_error error = {0};
   sonde_model *model = NULL;
   if (argc < 2) return 2;
+  setvbuf(stdout, NULL, _IOLBF, 0);
   stop_on(sonde_model_load(argv[1], &model, &error), &error);
   const uint32_t every = argc > 2 ? (uint32_t)atoi(argv[2]) : 8;
   const double fine = argc > 3 ? strtod(argv[3], NULL) * 1e-3 : 0.003;
@@ -95,7 +96,7 @@ int main(int argc, char **argv) {
   const sonde_elastic_def def = {.mesh = &t, .held = held};
   sonde_elastic *solid;
   stop_on(sonde_elastic_create(&def, &solid, &error), &error);
-  solid->accuracy = 1e-7;
+  solid->accuracy = 1e-4; // the work of a footprint is off by its square
   printf("%u nodes, %u tetrahedra, %.1f thousand million multiplications a factor, %.1f s\n",
          solid->count, t.count, 1e-9 * (double)solid->symbolic->macs, sonde_clock_now() - start);
 

@@ -5,9 +5,9 @@
 #include "geometry/shapes.h"
 #include "elements/material.h"
 
-void material_batch_double(sonde_material law, double mu, double lambda, const double *f,
+void material_batch_double(sonde_elastic_material law, double mu, double lambda, const double *f,
                            const double *df, double *out);
-void material_batch_float(sonde_material law, double mu, double lambda, const double *f,
+void material_batch_float(sonde_elastic_material law, double mu, double lambda, const double *f,
                           const double *df, double *out);
 
 static const double MU = 2e3, LAMBDA = 9e4;
@@ -21,7 +21,7 @@ static void test_derivatives(void **state) {
   const double h = 1e-5;
   uint64_t seed = 1;
   for (int round = 0; round < 200; ++round) {
-    sonde_material law = round % 2 ? SONDE_NEO_HOOKEAN : SONDE_LINEAR;
+    sonde_elastic_material law = round % 2 ? SONDE_NEO_HOOKEAN : SONDE_LINEAR;
     double f[9], p[9], df[9], dp[9], up[9], down[9];
     random_gradient(&seed, 0.4, f);
     material_stress(law, MU, LAMBDA, f, p);
@@ -50,8 +50,8 @@ static void test_same_at_rest(void **state) {
   uint64_t seed = 2;
   double p[9], a[9], b[9], df[9];
   for (int law = 0; law < 2; ++law) {
-    assert_near(material_energy((sonde_material)law, MU, LAMBDA, rest), 0, 1e-12);
-    material_stress((sonde_material)law, MU, LAMBDA, rest, p);
+    assert_near(material_energy((sonde_elastic_material)law, MU, LAMBDA, rest), 0, 1e-12);
+    material_stress((sonde_elastic_material)law, MU, LAMBDA, rest, p);
     for (int k = 0; k < 9; ++k) assert_near(p[k], 0, 1e-9);
   }
   random_gradient(&seed, 1, df);
@@ -98,14 +98,15 @@ static void test_batches(void **state) {
       for (int i = 0; i < MOST; ++i)
         random_gradient(&seed, 0.3, f[i]), random_gradient(&seed, 1, df[i]);
       if (width == 8)
-        material_batch_double((sonde_material)law, MU, LAMBDA, f[0], df[0], out[0]);
+        material_batch_double((sonde_elastic_material)law, MU, LAMBDA, f[0], df[0], out[0]);
       else
-        material_batch_float((sonde_material)law, MU, LAMBDA, f[0], df[0], out[0]);
+        material_batch_float((sonde_elastic_material)law, MU, LAMBDA, f[0], df[0], out[0]);
       for (int i = 0; i < width; ++i) {
         double p[9], dp[9], near = width == 8 ? 0 : 3e-6 * LAMBDA;
-        material_stress((sonde_material)law, MU, LAMBDA, f[i], p);
-        material_tangent((sonde_material)law, MU, LAMBDA, f[i], df[i], dp);
-        assert_near(out[i][0], material_energy((sonde_material)law, MU, LAMBDA, f[i]), near);
+        material_stress((sonde_elastic_material)law, MU, LAMBDA, f[i], p);
+        material_tangent((sonde_elastic_material)law, MU, LAMBDA, f[i], df[i], dp);
+        assert_near(out[i][0], material_energy((sonde_elastic_material)law, MU, LAMBDA, f[i]),
+                    near);
         for (int k = 0; k < 9; ++k) {
           assert_near(out[i][1 + k], p[k], near);
           assert_near(out[i][10 + k], dp[k], near);

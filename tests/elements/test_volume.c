@@ -8,7 +8,7 @@
 
 static const double YOUNG = 1e4, POISSON = 0.47;
 
-static sonde_elastic_volume *make_volume(const sonde_tetrahedra *t, sonde_material material,
+static sonde_elastic_volume *make_volume(const sonde_tetrahedra *t, sonde_elastic_material material,
                                          sonde_dilatation dilatation, const uint8_t *held) {
   double *young = calloc(t->count, sizeof *young);
   for (uint32_t k = 0; k < t->count; ++k) young[k] = YOUNG * (1 + k % 3);
@@ -40,7 +40,7 @@ static void test_derivatives(void **state) {
   uint64_t seed = 1;
   for (int k = 0; k < 6; ++k) {
     sonde_elastic_volume *v =
-        make_volume(&t, (sonde_material)(k % 2), (sonde_dilatation)(k / 2), NULL);
+        make_volume(&t, (sonde_elastic_material)(k % 2), (sonde_dilatation)(k / 2), NULL);
     const double h = 1e-6;
     randomise(u, n, &seed, 1e-3);
     randomise(d, n, &seed, 1e-3);
@@ -171,7 +171,7 @@ static void test_push(void **state) {
   assert_in_range(count, 5, 60);
   for (int material = 0; material < 2; ++material) {
     sonde_elastic_volume *v =
-        make_volume(&t, (sonde_material)material, SONDE_DILATATION_PATCH, NULL);
+        make_volume(&t, (sonde_elastic_material)material, SONDE_DILATATION_PATCH, NULL);
     sonde_elastic_volume_result result;
     memset(u, 0, 3 * (size_t)t.node_count * sizeof *u);
     for (int step = 1; step <= 5; ++step) {

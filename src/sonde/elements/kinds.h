@@ -11,6 +11,6 @@ typedef enum sonde_dilatation {
 } sonde_dilatation;
 
 // The laws of material.h.
-typedef enum sonde_material { SONDE_LINEAR, SONDE_NEO_HOOKEAN } sonde_material;
+typedef enum sonde_elastic_material { SONDE_LINEAR, SONDE_NEO_HOOKEAN } sonde_elastic_material;
 
 #endif

@@ -40,7 +40,7 @@ INLINE reals product_of(const reals a[9], const reals b[9]) {
 }
 
 // W at F, J/m3.
-INLINE reals material_energy(sonde_material law, reals mu, reals lambda, const reals f[9]) {
+INLINE reals material_energy(sonde_elastic_material law, reals mu, reals lambda, const reals f[9]) {
   if (law == SONDE_LINEAR) {
     reals squares = all(0), trace = f[0] + f[4] + f[8] - 3;
     for (int i = 0; i < 3; ++i)
@@ -55,7 +55,7 @@ INLINE reals material_energy(sonde_material law, reals mu, reals lambda, const r
 }
 
 // P = dW/dF, Pa.
-INLINE void material_stress(sonde_material law, reals mu, reals lambda, const reals f[9],
+INLINE void material_stress(sonde_elastic_material law, reals mu, reals lambda, const reals f[9],
                             reals p[9]) {
   if (law == SONDE_LINEAR) {
     reals pressure = lambda * (f[0] + f[4] + f[8] - 3);
@@ -69,7 +69,7 @@ INLINE void material_stress(sonde_material law, reals mu, reals lambda, const re
 }
 
 // Change of P under a change df of F.
-INLINE void material_tangent(sonde_material law, reals mu, reals lambda, const reals f[9],
+INLINE void material_tangent(sonde_elastic_material law, reals mu, reals lambda, const reals f[9],
                              const reals df[9], reals dp[9]) {
   if (law == SONDE_LINEAR) {
     reals pressure = lambda * (df[0] + df[4] + df[8]);
@@ -87,8 +87,9 @@ INLINE void material_tangent(sonde_material law, reals mu, reals lambda, const r
 
 // Stiffness k[3 node + axis][...] of a tetrahedron of `volume` with the gradients g[4][3] of its
 // shape functions, at F.
-INLINE void tetrahedron_stiffness(sonde_material law, reals mu, reals lambda, const reals f[9],
-                                  const reals g[4][3], reals volume, reals k[12][12]) {
+INLINE void tetrahedron_stiffness(sonde_elastic_material law, reals mu, reals lambda,
+                                  const reals f[9], const reals g[4][3], reals volume,
+                                  reals k[12][12]) {
   for (int b = 0; b < 4; ++b)
     for (int j = 0; j < 3; ++j) {
       reals df[9], dp[9];

@@ -9,6 +9,7 @@
 
 enum { GROUPS = 8, ROUNDS = 20 };  // the skin counts as a group
 static const double CLOSE = 1e-6;  // change of ln E that ends the fit
+static const double FLAT = 1e-5;   // share of the misfit whose loss ends it
 static const double LONGEST = 1.5; // step of ln E
 
 typedef struct fit {
@@ -102,6 +103,7 @@ static sonde_status minimise(fit *t, double *x, sonde_moduli_result *result, son
     ++result->rounds, result->change = change;
     if (status) break;
     if (misfit <= result->misfit) {
+      if (misfit > (1 - FLAT) * result->misfit) result->change = 0;
       memcpy(x, trial, t->unknowns * sizeof *x);
       result->misfit = misfit, damping /= 10;
     } else if (change > CLOSE) {

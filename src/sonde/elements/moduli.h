@@ -17,7 +17,7 @@ typedef struct sonde_bonded_footprint {
 typedef struct sonde_moduli_result {
   uint32_t rounds;
   double misfit;     // sum of weight (stiffness - measured)^2
-  double change;     // largest change of ln E in the last round
+  double change;     // largest change of ln E in the last round; 0: the misfit stayed
   double *stiffness; // [footprints] of the solid, given by the caller, may be NULL
 } sonde_moduli_result;
 

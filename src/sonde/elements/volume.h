@@ -9,7 +9,7 @@
 
 typedef struct sonde_elastic_volume_def {
   const sonde_tetrahedra *mesh; // borrowed while the solid lives
-  sonde_material material;
+  sonde_elastic_material material;
   sonde_dilatation dilatation;
   const uint8_t *held;    // [node_count] as in sonde_elastic_def
   const double *young_pa; // [tetrahedra] borrowed during the call
@@ -18,7 +18,7 @@ typedef struct sonde_elastic_volume_def {
 
 typedef struct sonde_elastic_volume {
   const sonde_tetrahedra *mesh;
-  sonde_material material;
+  sonde_elastic_material material;
   uint32_t batch_count;
   sonde_elastic_volume_batch *batch; // at whole cache lines of memory
   void *memory;

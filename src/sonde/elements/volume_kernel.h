@@ -22,7 +22,7 @@ INLINE void deformation(const sonde_elastic_volume_batch *b, const double *u, re
 }
 
 // dJ = c : dF; returns J - 1.
-INLINE reals growth_of(sonde_material law, const reals f[9], reals c[9]) {
+INLINE reals growth_of(sonde_elastic_material law, const reals f[9], reals c[9]) {
   if (law == SONDE_NEO_HOOKEAN) return cofactors(f, c) - 1;
   for (int k = 0; k < 9; ++k) c[k] = all(k % 4 == 0);
   return f[0] + f[4] + f[8] - 3;
@@ -39,8 +39,8 @@ INLINE void add_forces(const sonde_elastic_volume_batch *b, const reals p[9], do
     }
 }
 
-static void growth(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
-                   const double *u, double *out) {
+static void growth(const sonde_elastic_volume_batch *batch, uint32_t count,
+                   sonde_elastic_material law, const double *u, double *out) {
   SONDE_ASSERT(u != NULL && out != NULL);
   for (uint32_t k = 0; k < count; ++k) {
     reals f[9], c[9];
@@ -50,7 +50,8 @@ static void growth(const sonde_elastic_volume_batch *batch, uint32_t count, sond
 }
 
 static void growth_change(const sonde_elastic_volume_batch *batch, uint32_t count,
-                          sonde_material law, const double *u, const double *d, double *out) {
+                          sonde_elastic_material law, const double *u, const double *d,
+                          double *out) {
   SONDE_ASSERT(u != NULL && d != NULL && out != NULL);
   for (uint32_t k = 0; k < count; ++k) {
     reals f[9], df[9], c[9];
@@ -61,8 +62,9 @@ static void growth_change(const sonde_elastic_volume_batch *batch, uint32_t coun
   }
 }
 
-static double forces(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
-                     const double *u, const double *pressure, double *out) {
+static double forces(const sonde_elastic_volume_batch *batch, uint32_t count,
+                     sonde_elastic_material law, const double *u, const double *pressure,
+                     double *out) {
   SONDE_ASSERT(u != NULL && pressure != NULL && out != NULL);
   wide_sum energy = all(0);
   for (uint32_t k = 0; k < count; ++k) {
@@ -77,9 +79,9 @@ static double forces(const sonde_elastic_volume_batch *batch, uint32_t count, so
   return total(energy);
 }
 
-static void tangent(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
-                    const double *u, const double *d, const double *pressure,
-                    const double *pressure_change, double *out) {
+static void tangent(const sonde_elastic_volume_batch *batch, uint32_t count,
+                    sonde_elastic_material law, const double *u, const double *d,
+                    const double *pressure, const double *pressure_change, double *out) {
   SONDE_ASSERT(u != NULL && d != NULL && pressure != NULL && out != NULL);
   for (uint32_t k = 0; k < count; ++k) {
     reals f[9], df[9], dp[9], c[9];

@@ -17,17 +17,18 @@ typedef struct sonde_elastic_volume_batch {
 typedef struct sonde_elastic_volume_kernels {
   const char *name;
   // Relative growth of volume at displacements u, and its change under d.
-  void (*growth)(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
-                 const double *u, double *growth);
-  void (*growth_change)(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
-                        const double *u, const double *d, double *change);
+  void (*growth)(const sonde_elastic_volume_batch *batch, uint32_t count,
+                 sonde_elastic_material law, const double *u, double *growth);
+  void (*growth_change)(const sonde_elastic_volume_batch *batch, uint32_t count,
+                        sonde_elastic_material law, const double *u, const double *d,
+                        double *change);
   // Adds forces of the shape change and of a pressure (tension positive) to f; returns the energy
   // of the shape change.
-  double (*forces)(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
-                   const double *u, const double *pressure, double *f);
-  void (*tangent)(const sonde_elastic_volume_batch *batch, uint32_t count, sonde_material law,
-                  const double *u, const double *d, const double *pressure,
-                  const double *pressure_change, double *df);
+  double (*forces)(const sonde_elastic_volume_batch *batch, uint32_t count,
+                   sonde_elastic_material law, const double *u, const double *pressure, double *f);
+  void (*tangent)(const sonde_elastic_volume_batch *batch, uint32_t count,
+                  sonde_elastic_material law, const double *u, const double *d,
+                  const double *pressure, const double *pressure_change, double *df);
 } sonde_elastic_volume_kernels;
 
 extern const sonde_elastic_volume_kernels sonde_elastic_volume_kernels_base;
