@@ -4,6 +4,7 @@
 #include "fit_doubts.h"
 #include "fit_report.h"
 #include "fit_sample.h"
+#include "fit_bulk.h"
 #include "options.h"
 
 #include <assert.h>
@@ -18,8 +19,9 @@ typedef struct options {
   const char *measurements, *surface, *sites, *output, *femur, *fat, *muscle, *name, *provenance;
   const char *report, *sample, *also;
   sonde_fit_def def;
-  int body, exponent, hold_out; // of the lists of words; hold_out -1: none
-  double area_m2, height_m;     // of a specimen; 0: those of its table
+  int body, exponent, hold_out, kind; // of the lists of words; hold_out -1: none
+  sonde_fit_bulk_def bulk;            // of a volumetric model
+  double area_m2, height_m;           // of a specimen; 0: those of its table
   double fine_m, inplane_n_m, tangential_n_m3, zero_sd_m, tare_sd_n;
   long starts, seed;
   bool zero, tare, json, profile, identify, layers, accept;
@@ -31,6 +33,7 @@ enum { EXPONENT_2 = 1, EXPONENT_AUTO = 3 };
 static void prepare(void *to) {
   options *o = to;
   o->def = sonde_fit_def_default();
+  o->bulk = sonde_fit_bulk_def_default();
   o->exponent = EXPONENT_2;
   o->hold_out = -1;
   o->fine_m = 1e-3 * 3;
@@ -55,6 +58,17 @@ static const app_option TABLE[] = {
     OPT_TEXT(sites, "sites", "FILE",
              "the measured places: site,x_mm,y_mm,z_mm,nx..nz,ux..uz,vx..vz[,fat_mm]"),
     OPT_OUTPUT(output, "o,output", "FILE", "model file to write; it appears when it is complete"),
+    OPT_WORD(
+        kind, "model", "KIND", fit_bulk_kinds,
+        "deformable model: two-layer, the paper's; laffont, linear springs through the volume; "
+        "lee, biphasic springs and a volume force in three layers over the bone; linear or "
+        "neo-hookean, tetrahedra. The last four have a few moduli for the whole thigh"),
+    OPT_REAL(bulk.edge_m, "mesh-mm", "L", 2, 50, 1e-3,
+             "edge of the tetrahedra at the skin of a volumetric model"),
+    OPT_REAL(bulk.fine_edge_m, "mesh-fine-mm", "L", 1, 50, 1e-3, "the same near the sites"),
+    OPT_REAL(bulk.poisson, "poisson", "NU", 0, 0.499, 1,
+             "Poisson ratio of linear and "
+             "neo-hookean"),
     OPT_INTEGER(
         def.stages, "stages", "N", 1, 3,
         "last stage. With 1 the model has one pair per site, no edges in the estimation and "
@@ -163,6 +177,12 @@ static int check(void *from) {
                ? app_usage_error(VERB,
                                  "--sample goes without measurements, surface, sites and model")
                : APP_OK;
+  if (o->kind != SONDE_TWO_LAYER) {
+    o->bulk.kind = (sonde_model_kind)o->kind;
+    return o->report || o->hold_out >= 0
+               ? app_usage_error(VERB, "--report and --hold-out need --model two-layer")
+               : APP_OK;
+  }
   const char *late = o->hold_out >= 0               ? "--hold-out"
                      : o->profile                   ? "--profile"
                      : o->identify                  ? "--identifiability"
@@ -198,12 +218,11 @@ static sonde_status load_layer(const char *named, const char *skin, const char *
 
 static const sonde_mesh *given(const sonde_mesh *mesh) { return mesh->vertex_count ? mesh : NULL; }
 
-static sonde_status build_model(const options *a, const fit_inputs *in, sonde_model **model,
-                                sonde_error *error) {
+// provenance: room for the text, which the definition borrows.
+static sonde_model_def define_model(const options *a, const fit_inputs *in, char provenance[256]) {
   sonde_model_def def = sonde_model_def_default();
-  char provenance[256];
   const char *slash = strrchr(a->measurements, '/');
-  snprintf(provenance, sizeof provenance, "fitted by sonde %s to %.100s", sonde_version(),
+  snprintf(provenance, 256, "fitted by sonde %s to %.100s", sonde_version(),
            slash ? slash + 1 : a->measurements);
   def.provenance = a->provenance ? a->provenance : provenance;
   if (a->name) def.name = a->name;
@@ -218,6 +237,13 @@ static sonde_status build_model(const options *a, const fit_inputs *in, sonde_mo
   def.fine_edge_m = a->fine_m;
   def.law.inplane_stiffness_n_m = a->inplane_n_m;
   def.law.tangential_stiffness_n_m3 = a->tangential_n_m3;
+  return def;
+}
+
+static sonde_status build_model(const options *a, const fit_inputs *in, sonde_model **model,
+                                sonde_error *error) {
+  char provenance[256];
+  const sonde_model_def def = define_model(a, in, provenance);
   sonde_status status = sonde_model_build(&def, model, error);
   if (!status && a->body == BODY_OTHER) (*model)->vein.count = (*model)->artery.count = 0;
   return status;
@@ -587,9 +613,19 @@ static int run(void *from) {
     status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &inputs.muscle, &error);
   if (!status) status = sonde_measurements_examine(&inputs.measurements, &out.doubts, &error);
   if (!status) status = decide(a, &out, 0, &error);
-  if (!status) status = fit_model(a, &inputs, &out, &error);
+  if (!status && a->kind != SONDE_TWO_LAYER) {
+    char provenance[256];
+    const sonde_model_def def = define_model(a, &inputs, provenance);
+    const fit_bulk_job job = {&def,     &inputs.sites, &inputs.measurements,
+                              &a->bulk, a->output,     a->json};
+    status = fit_bulk_run(&job, &error);
+    out.result.converged = true;
+  } else if (!status) {
+    status = fit_model(a, &inputs, &out, &error);
+  }
   double seconds = app_seconds(CLOCK_MONOTONIC) - start;
-  if (!status) (a->json ? print_json : print_table)(a, &inputs.measurements, &out, seconds);
+  if (!status && a->kind == SONDE_TWO_LAYER)
+    (a->json ? print_json : print_table)(a, &inputs.measurements, &out, seconds);
   int code = status ? app_fail(VERB, &error) : APP_OK;
   if (!status && !out.result.converged)
     fprintf(stderr, "sonde fit: the last stage reached its iteration limit before it converged\n");

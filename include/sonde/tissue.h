@@ -16,8 +16,49 @@
 extern "C" {
 #endif
 
-/** Deformable models (docs/tissue.md). */
-typedef enum sonde_model_kind { SONDE_TWO_LAYER } sonde_model_kind;
+/** Deformable models: the two-layer tissue (docs/tissue.md) and volumetric ones (docs/bulk.md).
+ */
+typedef enum sonde_model_kind {
+  SONDE_TWO_LAYER,         /**< the paper's: masses and springs of the skin alone */
+  SONDE_LATTICE,           /**< linear springs through the volume (Laffont 1997) */
+  SONDE_THREE_LAYER,       /**< biphasic springs and a volume force in skin, fat and muscle (Lee,
+                                Terzopoulos and Waters 1995) */
+  SONDE_LINEAR_SOLID,      /**< linear elastic tetrahedra */
+  SONDE_NEO_HOOKEAN_SOLID, /**< neo-Hookean tetrahedra */
+} sonde_model_kind;
+
+/** Layers of a volumetric body. */
+typedef enum sonde_bulk_layer {
+  SONDE_LAYER_FAT,
+  SONDE_LAYER_MUSCLE,
+  SONDE_LAYERS
+} sonde_bulk_layer;
+
+/** Parameters of a volumetric body; what its kind does not use is ignored. */
+typedef struct sonde_bulk_law {
+  double density_kg_m3;
+  double damping_s;               /**< dampers: this time times the stiffness */
+  double skin_n_m;                /**< membrane stiffness of the skin's springs (three layers) */
+  double spring_pa[SONDE_LAYERS]; /**< modulus that the springs of a layer stand for; of a lattice
+                                       that of muscle everywhere */
+  double steepening, knee; /**< beyond the strain `knee` a spring is so many times as stiff */
+  double volume_pa;        /**< of the volume force: pressure per change of volume */
+  double young_pa[SONDE_LAYERS], poisson; /**< of solids */
+  double stiffness_scale;                 /**< of everything; 1 */
+} sonde_bulk_law;
+
+/** What a volumetric model has besides its skin. Nodes that bone holds come behind all others. */
+typedef struct sonde_bulk {
+  uint32_t node_count; /**< that move: those of the skin first, then inner ones */
+  uint32_t held_count, element_count;
+  sonde_vec3 *node;            /**< [node_count + held_count] at rest, m */
+  double *mass_kg, *area_m2;   /**< [node_count]; inner nodes have no area */
+  double *shortest_m;          /**< [node_count] shortest edge at the node */
+  uint32_t *start, *neighbour; /**< [node_count + 1], and moving nodes that share an edge */
+  uint32_t (*element)[4];      /**< [element_count] positively oriented tetrahedra */
+  uint32_t *layer;             /**< [element_count] sonde_bulk_layer */
+  sonde_bulk_law law;
+} sonde_bulk;
 
 /** Uniform parameters of the surface layer and of the material's damping. */
 typedef struct sonde_surface_law {
@@ -111,7 +152,8 @@ typedef struct sonde_model {
   sonde_vessel vein, artery; /**< femoral vessels */
   /** NULL, or named anatomy (sonde/tissue_anatomy.h); released with the model by sonde_free. */
   struct sonde_thigh_anatomy *anatomy;
-  uint64_t checksum; /**< of the file's content; 0 before it is saved or loaded */
+  struct sonde_bulk *bulk; /**< NULL, or of a volumetric model; released with it */
+  uint64_t checksum;       /**< of the file's content; 0 before it is saved or loaded */
 } sonde_model;
 
 /** What a model is built from; zero means default where a default is named. */

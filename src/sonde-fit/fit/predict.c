@@ -70,6 +70,9 @@ sonde_status sonde_predict(const sonde_model *model, const sonde_site_table *sit
     return sonde_fail(error, SONDE_ARGUMENT,
                       "relative_residual is %g and max_iterations %u, expected > 0 and >= 1",
                       def->relative_residual, def->max_iterations);
+  if (model->bulk && def->interaction != SONDE_INTERACTION_FULL)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "a volumetric model has no simplified interaction, expected the full one");
   sonde_fit_plan plan;
   sonde_status status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
   if (!status) status = sonde_fit_plan_create_all(sites, measurements, &plan, error);

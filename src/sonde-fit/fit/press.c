@@ -4,6 +4,7 @@
 
 #include "base/maths.h"
 #include "sonde/world_path.h"
+#include "tissue/bulk/bulk.h"
 
 sonde_status sonde_press_create(const sonde_model *model, double relative_residual,
                                 uint32_t max_iterations, sonde_press *press, sonde_error *error) {
@@ -49,9 +50,28 @@ void sonde_press_pool_destroy(sonde_press *pool, uint32_t workers) {
 sonde_status sonde_bonded_create(const sonde_model *model, const sonde_site *site, double half_u_m,
                                  double half_v_m, double relative_residual, uint32_t max_iterations,
                                  sonde_bonded *b, sonde_error *error) {
+  *b = (sonde_bonded){0};
+  if (!model->bulk)
+    return sonde_bonded_create_on(model, site, half_u_m, half_v_m, relative_residual,
+                                  max_iterations, b, error);
+  sonde_model *local;
+  sonde_status status = sonde_bulk_refine_at(model, site->position_m, &local, error);
+  if (status) return status;
+  status = sonde_bonded_create_on(local, site, half_u_m, half_v_m, relative_residual,
+                                  max_iterations, b, error);
+  if (status)
+    sonde_model_destroy(local);
+  else
+    b->cut_model = local;
+  return status;
+}
+
+sonde_status sonde_bonded_create_on(const sonde_model *model, const sonde_site *site,
+                                    double half_u_m, double half_v_m, double relative_residual,
+                                    uint32_t max_iterations, sonde_bonded *b, sonde_error *error) {
   *b = (sonde_bonded){.normal = site->normal};
   sonde_status status;
-  if (model->law.shear_stiffness_n_m > 0) {
+  if (model->law.shear_stiffness_n_m > 0 && !model->bulk) {
     // The skin is cut along the footprint; what lies within is held.
     sonde_cut cut;
     status = sonde_cut_create(model, site, half_u_m, half_v_m, INFINITY, &cut, error);
@@ -89,6 +109,8 @@ void sonde_bonded_clear(sonde_bonded *b) {
 double sonde_bonded_force(sonde_bonded *b, double depth_m) {
   SONDE_ASSERT(depth_m >= 0 && b->held_count > 0);
   SONDE_ASSERT(b->held_count <= b->press.model->surface.vertex_count);
+  bool linear = b->press.model->kind == SONDE_LINEAR_SOLID;
+  if (linear && b->stiffness_n_m > 0) return b->stiffness_n_m * depth_m;
   const sonde_vec3 *rest = b->press.model->surface.vertices;
   for (uint32_t h = 0; h < b->held_count; ++h)
     b->press.position_m[h] = v_madd(rest[b->held[h]], -depth_m, b->normal);
@@ -96,6 +118,8 @@ double sonde_bonded_force(sonde_bonded *b, double depth_m) {
   sonde_settle_result result =
       sonde_settle_bonded(b->press.state, b->held, b->press.position_m, b->held_count,
                           b->press.relative_residual, b->press.max_iterations, &force_n);
+  if (linear && result.converged && depth_m > 0)
+    b->stiffness_n_m = v_dot(force_n, b->normal) / depth_m;
   return result.converged ? v_dot(force_n, b->normal) : NAN;
 }
 

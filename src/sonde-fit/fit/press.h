@@ -27,18 +27,25 @@ void sonde_press_pool_destroy(sonde_press *pool, uint32_t workers);
 
 // A footprint bonded to the skin at a site. With a shear layer the skin is cut along the
 // footprint's sides, so that the forces do not depend on where the sides fall between the nodes;
-// without one (the paper's model) the nodes under it are held.
+// without one (the paper's model) the nodes under it are held. A volumetric model is filled anew with
+// tetrahedra that are fine under the footprint.
 typedef struct sonde_bonded {
   sonde_press press; // on the cut model, or on the model itself
   sonde_model *cut_model;
   uint32_t *held;
   uint32_t held_count;
   sonde_vec3 normal;
+  double stiffness_n_m; // of a linear solid, once it is known; else 0
 } sonde_bonded;
 
 sonde_status sonde_bonded_create(const sonde_model *model, const sonde_site *site, double half_u_m,
                                  double half_v_m, double relative_residual, uint32_t max_iterations,
                                  sonde_bonded *bonded, sonde_error *error);
+// The same with the model's own nodes: a volumetric one is not meshed anew.
+sonde_status sonde_bonded_create_on(const sonde_model *model, const sonde_site *site,
+                                    double half_u_m, double half_v_m, double relative_residual,
+                                    uint32_t max_iterations, sonde_bonded *bonded,
+                                    sonde_error *error);
 void sonde_bonded_clear(sonde_bonded *bonded);
 // Force along the normal with the held nodes moved by -depth normal, all others free; starts from
 // the last equilibrium. NaN when none is found.

@@ -3,12 +3,36 @@
 
 #include "base/base.h"
 
-static const sonde_kind *const kinds[] = {[SONDE_TWO_LAYER] = &sonde_two_layer_kind};
+#include <string.h>
+
+static const sonde_kind *const kinds[] = {[SONDE_TWO_LAYER] = &sonde_two_layer_kind,
+                                          [SONDE_LATTICE] = &sonde_lattice_kind,
+                                          [SONDE_THREE_LAYER] = &sonde_three_layer_kind,
+                                          [SONDE_LINEAR_SOLID] = &sonde_linear_solid_kind,
+                                          [SONDE_NEO_HOOKEAN_SOLID] = &sonde_neo_hookean_kind};
 
 static const sonde_kind *kind_of(const sonde_model *model) {
   SONDE_ASSERT((size_t)model->kind < SONDE_COUNT_OF(kinds));
   return kinds[model->kind];
 }
+
+const char *sonde_model_kind_name(sonde_model_kind kind) {
+  SONDE_ASSERT((size_t)kind < SONDE_COUNT_OF(kinds));
+  return kinds[kind]->name;
+}
+
+sonde_status sonde_model_kind_named(const char *name, sonde_model_kind *kind, sonde_error *error) {
+  for (size_t k = 0; k < SONDE_COUNT_OF(kinds); ++k)
+    if (strcmp(kinds[k]->name, name) == 0) {
+      *kind = (sonde_model_kind)k;
+      return SONDE_OK;
+    }
+  return sonde_fail(error, SONDE_ARGUMENT,
+                    "'%s' is no model, expected two-layer, laffont, lee, linear or neo-hookean",
+                    name);
+}
+
+sonde_family sonde_model_family(const sonde_model *model) { return kind_of(model)->family; }
 
 sonde_nodes sonde_model_nodes(const sonde_model *model) { return kind_of(model)->nodes(model); }
 

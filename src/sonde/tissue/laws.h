@@ -86,6 +86,25 @@ INLINE edge_pull pull_edge(const edge_law *law, reals share, reals rest, const r
   return at;
 }
 
+// A spring whose stiffness becomes another one beyond the stretch `knee` (Lee, Terzopoulos and
+// Waters 1995); where both are equal, a linear spring.
+typedef struct biphasic_law {
+  reals stiffness, steep, knee;
+} biphasic_law;
+
+// d: from the first end to the second. The geometric part is dropped in compression.
+INLINE edge_pull pull_biphasic(const biphasic_law *law, reals rest, const reals d[3]) {
+  edge_pull at = {0};
+  reals least = (real)SONDE_SHORTEST_EDGE * rest, length2 = larger(dot(d, d), least * least);
+  reals inverse, length = root_and_inverse(length2, &inverse);
+  for (int c = 0; c < 3; ++c) at.n[c] = d[c] * inverse;
+  reals stretch = length - rest, beyond = larger(stretch - law->knee, all(0));
+  at.pull = law->stiffness * stretch + (law->steep - law->stiffness) * beyond;
+  at.lateral = larger(at.pull, all(0)) * inverse;
+  at.along = pick(beyond > 0, law->steep, law->stiffness) - at.lateral;
+  return at;
+}
+
 // A |grad s|^2 over a face with indentations s at its corners and half the cotangents there;
 // across[] makes half the cotangent Laplacian of s at corner k, across[k + 2] - across[k + 1].
 INLINE reals square_slope(const reals half_cotangent[3], const reals s[3], reals across[3]) {

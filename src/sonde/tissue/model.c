@@ -1,5 +1,6 @@
 // Building, changing and releasing the thigh model.
 #include "tissue/model.h"
+#include "tissue/bulk/bulk.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -258,6 +259,7 @@ void sonde_model_destroy(sonde_model *model) {
                     model->face_edge,    model->sites,          model->data,
                     model->anatomy,      model->shear_share,    model->limit_share};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
+  sonde_bulk_destroy(model->bulk);
   sonde_topology_clear(&model->topology);
   sonde_mesh_clear(&model->surface);
   sonde_mesh_clear(&model->femur);

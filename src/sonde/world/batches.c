@@ -10,7 +10,7 @@
 
 #include <string.h>
 
-// In the order of sonde_model_kind.
+// In the order of sonde_family.
 static const sonde_model_kernels models[] = {
 #ifdef __x86_64__
 #define X(model)                                                                                   \
@@ -35,7 +35,8 @@ static size_t carve(sonde_batches *l, uint32_t faces, char *base) {
   uint32_t batches = l->common.batch_count, face_batches = l->face_batch_count;
   uint32_t groups = sonde_vectors_of(batches);
   bool searches = sizeof(real) == sizeof(double);
-  size_t offset = 0, rows = (size_t)batches * SONDE_BATCH, seen = rows + l->seen_count;
+  // One more row than is published stays still.
+  size_t offset = 0, rows = (size_t)batches * SONDE_BATCH, seen = rows + l->seen_count + 1;
   CARVE(rows, batches), CARVE(box, groups), CARVE(batch, batches);
   CARVE(base, searches ? batches : 0), CARVE(free, searches ? batches : 0);
   CARVE(contact, batches), CARVE(contact_of, batches), CARVE(contact_batch, batches);
@@ -221,7 +222,7 @@ static void destroy(sonde_engine_data *data) {
 // Measures, allocates and fills a body whose counts of nodes, batches and parts are known.
 static sonde_status lay_out(sonde_batches *body, const sonde_model *model,
                             const sonde_world_def *def, sonde_error *error) {
-  const sonde_tissue_calls *calls = models[model->kind].calls;
+  const sonde_tissue_calls *calls = models[sonde_model_family(model)].calls;
   size_t around = 2 * ((size_t)most_around(body, &model->topology) * SONDE_BATCH + 1);
   uint32_t faces = model->surface.face_count;
   char *room = sonde_calloc(body->common.batch_count + 1, sizeof(sonde_rows));
@@ -347,8 +348,7 @@ static void refresh(sonde_engine_data *data) {
 }
 
 const sonde_kernels *sonde_kernels_find(const sonde_model *model, const char *name) {
-  SONDE_ASSERT((size_t)model->kind < SONDE_COUNT_OF(models));
-  const sonde_model_kernels *known = &models[model->kind];
+  const sonde_model_kernels *known = &models[sonde_model_family(model)];
   for (size_t k = 0; k < SONDE_COUNT_OF(known->kernels); ++k)
     if (known->kernels[k] && sonde_vectors_serve(known->kernels[k]->name, name))
       return known->kernels[k];

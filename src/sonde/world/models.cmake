@@ -1,6 +1,6 @@
 # Kernels of every deformable model, folder tissue/MODEL: world/kernel.c in each precision for each
 # instruction set, as one written source file each.
-set(sonde_models two_layer)
+set(sonde_models two_layer bulk)
 set(sonde_kernel_sets base)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   list(APPEND sonde_kernel_sets avx2 avx512)

@@ -5,10 +5,12 @@
 
 #include "world/batches.h"
 
+#include "tissue/kinds.h"
 #include "tissue/two_layer/batches.h"
+#include "tissue/bulk/batches.h"
 
-// In the order of sonde_model_kind.
-#define SONDE_MODELS(X) X(two_layer)
+// In the order of sonde_family.
+#define SONDE_MODELS(X) X(two_layer) X(bulk)
 
 #ifdef SONDE_REAL_DOUBLE
 #define SONDE_KERNELS_OF(model, set) sonde_kernels_##model##_##set##_double

@@ -168,8 +168,10 @@ static bool begin(sonde_state *state, problem *p) {
   sonde_batches_list(body, body->common.is_awake);
   body->step.reach = body->step.force_scale = body->step.stiffness_scale = 1;
   body->step.damping_scale = 0;
-  *p =
-      (problem){.state = state, .body = body, .pose = {.rotation = quat_identity()}, .tau_s = 0.02};
+  *p = (problem){.state = state,
+                 .body = body,
+                 .pose = {.rotation = quat_identity()},
+                 .tau_s = state->model->bulk ? 1 : 0.02};
   return true;
 }
 

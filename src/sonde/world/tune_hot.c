@@ -15,6 +15,12 @@ static void scale_springs(sonde_state *state) {
   law->normal_damping_s *= t->damping_scale;
   law->edge_damping_s *= t->damping_scale;
   sonde_law_scale(law, t->stiffness_scale);
+  if (state->model->bulk) {
+    state->tuned_bulk = *state->model->bulk;
+    state->tuned.bulk = &state->tuned_bulk;
+    state->tuned_bulk.law.stiffness_scale *= t->stiffness_scale;
+    state->tuned_bulk.law.damping_s *= t->damping_scale;
+  }
   for (uint32_t i = 0; i < state->model->surface.vertex_count; ++i)
     state->tuned_k0[i] = t->stiffness_scale * state->model->k0_n_m3[i];
 }

@@ -1,0 +1,2 @@
+// A volumetric body in one precision: its layout.
+#include "tissue/bulk/layout.c"
