@@ -27,8 +27,8 @@ void sonde_press_pool_destroy(sonde_press *pool, uint32_t workers);
 
 // A footprint bonded to the skin at a site. With a shear layer the skin is cut along the
 // footprint's sides, so that the forces do not depend on where the sides fall between the nodes;
-// without one (the paper's model) the nodes under it are held. A volumetric model is filled anew with
-// tetrahedra that are fine under the footprint.
+// without one (the paper's model) the nodes under it are held. A volumetric model is filled anew
+// with tetrahedra that are fine under the footprint.
 typedef struct sonde_bonded {
   sonde_press press; // on the cut model, or on the model itself
   sonde_model *cut_model;

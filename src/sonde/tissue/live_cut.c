@@ -194,6 +194,9 @@ sonde_status sonde_model_cut(const sonde_model *model, const sonde_vec3 *positio
                              sonde_cut_map *map, sonde_error *error) {
   SONDE_ASSERT(model && path_m && out);
   *out = NULL;
+  if (model->bulk)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "a volumetric model cannot be cut, expected a two-layer one");
   sonde_cut_map own = {0};
   sonde_copies copies = {0};
   sonde_cut_path path = {0};

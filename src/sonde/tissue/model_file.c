@@ -13,7 +13,8 @@
 #include <zlib.h>
 
 #define MAGIC "SONDE-MODEL "
-enum { FORMAT_VERSION = 4, OLDEST_VERSION = 2 };
+// Volumetric models have version 5, so that programs which do not know them refuse them.
+enum { BULK_VERSION = 5, FORMAT_VERSION = 4, OLDEST_VERSION = 2 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 
@@ -187,11 +188,13 @@ static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
   put_vessel(w, "vein", &model->vein);
   put_vessel(w, "artery", &model->artery);
   if (model->anatomy) sonde_anatomy_put_arrays(w, model->anatomy);
+  if (model->bulk) sonde_bulk_put_arrays(w, model);
   sonde_json_end(header);
   sonde_json_put_text(header, "name", model->name);
   sonde_json_put_text(header, "provenance", model->provenance);
   sonde_json_put_text(header, "written_by", "sonde " SONDE_VERSION_STRING);
   if (model->anatomy) sonde_anatomy_put_section(header, model->anatomy);
+  if (model->bulk) sonde_bulk_put_section(header, model);
   sonde_json_end(header);
 }
 
@@ -212,8 +215,8 @@ sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error 
   if (!status) status = sonde_file_create(path, &file, error);
   if (!status) {
     // magic line, header, arrays and the CRC-32 of them all
-    size_t length =
-        (size_t)snprintf(magic, sizeof magic, MAGIC "%d %zu %zu\n", FORMAT_VERSION, count, w.used);
+    size_t length = (size_t)snprintf(magic, sizeof magic, MAGIC "%d %zu %zu\n",
+                                     model->bulk ? BULK_VERSION : FORMAT_VERSION, count, w.used);
     uLong crc = crc32_z(0, (const Bytef *)magic, length);
     crc = crc32_z(crc, (const Bytef *)text, count);
     uint32_t tail = (uint32_t)crc32_z(crc, (const Bytef *)w.blob, w.used);
@@ -505,7 +508,7 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
   if (!status) status = sonde_model_derive(model, r->error);
   if (!status && is_cut) status = check_closed(r, model, true);
   if (!status && is_cut && !take_cuts(r, model)) status = SONDE_FORMAT;
-  return status;
+  return status ? status : sonde_bulk_take(r, model);
 }
 
 sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *error) {
@@ -533,9 +536,9 @@ sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *
                           stored);
     else if (sscanf(bytes + strlen(MAGIC), "%d %zu %zu%n", &version, &text, &blob, &used) != 3)
       status = sonde_fail(error, SONDE_FORMAT, "%s:1: expected a version and two sizes", path);
-    else if (version < OLDEST_VERSION || version > FORMAT_VERSION)
+    else if (version < OLDEST_VERSION || version > BULK_VERSION)
       status = sonde_fail(error, SONDE_VERSION, "%s: has format version %d, expected %d to %d",
-                          path, version, OLDEST_VERSION, FORMAT_VERSION);
+                          path, version, OLDEST_VERSION, BULK_VERSION);
     start = strlen(MAGIC) + (size_t)used + 1;
     if (!status && (text > count || blob > count || start + text + blob + 4 != count))
       status = sonde_fail(error, SONDE_FORMAT,

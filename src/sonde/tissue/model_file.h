@@ -30,6 +30,10 @@ const void *sonde_model_take(const sonde_model_reader *r, const char *name, cons
 // The arrays of the anatomy, and its section of the header; a model without anatomy has neither.
 void sonde_anatomy_put_arrays(sonde_model_writer *w, const sonde_thigh_anatomy *anatomy);
 void sonde_anatomy_put_section(sonde_json_out *header, const sonde_thigh_anatomy *anatomy);
+// Likewise of a volumetric model's inside; read when skin and law are there.
+void sonde_bulk_put_arrays(sonde_model_writer *w, const sonde_model *model);
+void sonde_bulk_put_section(sonde_json_out *header, const sonde_model *model);
+sonde_status sonde_bulk_take(const sonde_model_reader *r, sonde_model *model);
 sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model);
 
 #endif
