@@ -55,11 +55,11 @@ typedef struct sonde_fit_bulk_result {
  * @thread owner
  */
 SONDE_API sonde_status sonde_fit_bulk(const sonde_model_def *def, const sonde_site_table *sites,
-                                        const sonde_measurements *measurements,
-                                        const sonde_fit_bulk_def *options,
-                                        const sonde_progress *progress, sonde_model **model,
-                                        sonde_fit_bulk_result *result, double *predicted_n,
-                                        sonde_error *error);
+                                      const sonde_measurements *measurements,
+                                      const sonde_fit_bulk_def *options,
+                                      const sonde_progress *progress, sonde_model **model,
+                                      sonde_fit_bulk_result *result, double *predicted_n,
+                                      sonde_error *error);
 
 #ifdef __cplusplus
 }

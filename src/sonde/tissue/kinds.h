@@ -23,8 +23,7 @@ extern const sonde_kind sonde_two_layer_kind, sonde_lattice_kind, sonde_three_la
 // @thread any
 sonde_family sonde_model_family(const sonde_model *model);
 // Names as in `sonde fit --model`. @return ARGUMENT naming those that there are @thread any
-SONDE_LINK const char *sonde_model_kind_name(sonde_model_kind kind);
-SONDE_LINK sonde_status sonde_model_kind_named(const char *name, sonde_model_kind *kind,
-                                               sonde_error *error);
+const char *sonde_model_kind_name(sonde_model_kind kind);
+sonde_status sonde_model_kind_named(const char *name, sonde_model_kind *kind, sonde_error *error);
 
 #endif

@@ -327,15 +327,6 @@ static void add_skin_springs(const sonde_model *model, sonde_bulk_graph *graph) 
 }
 
 // K_ab = V (lambda g_a g_b^T + mu g_b g_a^T + mu g_a.g_b I) of a linear tetrahedron.
-static sonde_mat3 solid_block(double volume, double mu, double lambda, sonde_vec3 a, sonde_vec3 b) {
-  const double x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};
-  sonde_mat3 m;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      m.m[i][j] = volume * (lambda * x[i] * y[j] + mu * y[i] * x[j] + (i == j) * mu * v_dot(a, b));
-  return m;
-}
-
 static void add_solids(const sonde_model *model, sonde_bulk_graph *graph) {
   const sonde_bulk *bulk = model->bulk;
   for (uint32_t e = 0; e < bulk->element_count; ++e) {
@@ -346,7 +337,13 @@ static void add_solids(const sonde_model *model, sonde_bulk_graph *graph) {
     for (int a = 0; a < 4; ++a)
       for (int b = 0; b < 4; ++b) {
         if (v[a] >= bulk->node_count) continue;
-        sonde_mat3 block = solid_block(size, mu, lambda, gradient[a], gradient[b]);
+        const double x[3] = {gradient[a].x, gradient[a].y, gradient[a].z};
+        const double y[3] = {gradient[b].x, gradient[b].y, gradient[b].z};
+        double flat = mu * v_dot(gradient[a], gradient[b]);
+        sonde_mat3 block;
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j)
+            block.m[i][j] = size * (lambda * x[i] * y[j] + mu * y[i] * x[j] + (i == j) * flat);
         sonde_mat3 *to = &graph->own[v[a]];
         if (a != b) to = graph->block ? &graph->block[slot_of(graph, v[a], v[b])] : NULL;
         if (to) *to = m_add(*to, block);

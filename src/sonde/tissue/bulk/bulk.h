@@ -15,9 +15,8 @@ SONDE_LINK sonde_bulk_law sonde_bulk_law_default(sonde_model_kind kind);
 // below the nearest node of the skin.
 // @return ARGUMENT for a law out of range or a two-layer kind, MISMATCH for another skin
 // @thread owner
-SONDE_LINK sonde_status sonde_model_fill(sonde_model *model, const sonde_tetrahedra *solid,
-                                         sonde_model_kind kind, const sonde_bulk_law *law,
-                                         sonde_error *error);
+sonde_status sonde_model_fill(sonde_model *model, const sonde_tetrahedra *solid,
+                              sonde_model_kind kind, const sonde_bulk_law *law, sonde_error *error);
 // How the tetrahedra of a model are to be; lengths in m, as in sonde_tetrahedra_def.
 typedef struct sonde_bulk_mesh {
   double edge_m, growth, fine_edge_m, fine_reach_m; // fine at every site of the model

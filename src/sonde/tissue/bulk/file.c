@@ -51,25 +51,6 @@ void sonde_bulk_put_section(sonde_json_out *header, const sonde_model *model) {
   sonde_json_end(header);
 }
 
-// Every tetrahedron names nodes that there are, with a volume of its own.
-static sonde_status check_elements(const sonde_model_reader *r, const sonde_bulk *bulk) {
-  uint32_t nodes = bulk->node_count + bulk->held_count;
-  for (uint32_t e = 0; e < bulk->element_count; ++e) {
-    const uint32_t *v = bulk->element[e];
-    for (int c = 0; c < 4; ++c)
-      if (v[c] >= nodes)
-        return sonde_fail(r->error, SONDE_FORMAT,
-                          "%s: tetrahedron %u names node %u, expected less than %u", r->path, e,
-                          v[c], nodes);
-    const sonde_vec3 *x = bulk->node;
-    sonde_vec3 a = v_sub(x[v[1]], x[v[0]]), b = v_sub(x[v[2]], x[v[0]]);
-    if (!(v_dot(v_cross(a, b), v_sub(x[v[3]], x[v[0]])) > 0) || bulk->layer[e] >= SONDE_LAYERS)
-      return sonde_fail(r->error, SONDE_FORMAT,
-                        "%s: tetrahedron %u is inside out, flat or of no layer", r->path, e);
-  }
-  return SONDE_OK;
-}
-
 sonde_status sonde_bulk_take(const sonde_model_reader *r, sonde_model *model) {
   const sonde_json *section = sonde_json_member(r->header, "bulk");
   if (!section) return SONDE_OK;
@@ -111,7 +92,20 @@ sonde_status sonde_bulk_take(const sonde_model_reader *r, sonde_model *model) {
   for (uint32_t i = 0; i < skin + inner; ++i)
     if (!(v_norm(bulk->node[i]) < 100))
       return sonde_fail(r->error, SONDE_FORMAT, "%s: bulk_nodes has a place beyond 100 m", r->path);
-  status = check_elements(r, bulk);
+  // Every tetrahedron names nodes that there are, with a volume of its own.
+  for (uint32_t e = 0; e < count; ++e) {
+    const uint32_t *v = bulk->element[e];
+    for (int c = 0; c < 4; ++c)
+      if (v[c] >= skin + inner)
+        return sonde_fail(r->error, SONDE_FORMAT,
+                          "%s: tetrahedron %u names node %u, expected less than %u", r->path, e,
+                          v[c], skin + inner);
+    sonde_vec3 origin = bulk->node[v[0]], edge[3];
+    for (int c = 0; c < 3; ++c) edge[c] = v_sub(bulk->node[v[c + 1]], origin);
+    if (!(v_dot(v_cross(edge[0], edge[1]), edge[2]) > 0) || bulk->layer[e] >= SONDE_LAYERS)
+      return sonde_fail(r->error, SONDE_FORMAT,
+                        "%s: tetrahedron %u is inside out, flat or of no layer", r->path, e);
+  }
   if (!status) status = sonde_model_set_bulk_law(model, &law, r->error);
   return status ? status : sonde_bulk_derive(bulk, model, r->error);
 }

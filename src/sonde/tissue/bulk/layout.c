@@ -80,25 +80,6 @@ static void destroy(sonde_tissue *data) {
   sonde_free(tissue);
 }
 
-// Counts of slots and corners per batch, and their sums.
-static void measure(bulk_tissue *tissue, const sonde_bulk *bulk, const sonde_bulk_graph *graph,
-                    uint32_t *corners, bulk_batch *size) {
-  for (uint32_t e = 0; tissue->solid && e < bulk->element_count; ++e)
-    for (int c = 0; c < 4; ++c)
-      if (bulk->element[e][c] < bulk->node_count) ++corners[bulk->element[e][c]];
-  for (uint32_t i = 0; i < bulk->node_count; ++i) {
-    bulk_batch *at = &size[i / SONDE_BATCH];
-    uint32_t slots = graph->start[i + 1] - graph->start[i];
-    at->slot_count = slots > at->slot_count ? slots : at->slot_count;
-    at->corner_count = corners[i] > at->corner_count ? corners[i] : at->corner_count;
-  }
-  for (uint32_t s = 0; s < sonde_vectors_of(bulk->node_count); ++s) {
-    size[s].first_slot = tissue->slot_count, size[s].first_corner = tissue->corner_count;
-    tissue->slot_count += size[s].slot_count;
-    tissue->corner_count += size[s].corner_count;
-  }
-}
-
 static void fill(bulk_tissue *tissue, const sonde_model *model, const sonde_layout *layout,
                  const sonde_bulk_graph *graph, sonde_rows *rows, uint32_t *corners) {
   const sonde_bulk *bulk = model->bulk;
@@ -150,7 +131,21 @@ static sonde_status create(const sonde_model *model, const sonde_layout *layout,
     tissue->damping_s = (real)bulk->law.damping_s;
     tissue->made_scale = (real)bulk->law.stiffness_scale, tissue->gain = 1;
     tissue->common.reads_rows = tissue->common.is_stiff = true;
-    measure(tissue, bulk, &graph, corners, size);
+    // Counts of slots and corners per batch, and their sums.
+    for (uint32_t e = 0; tissue->solid && e < bulk->element_count; ++e)
+      for (int c = 0; c < 4; ++c)
+        if (bulk->element[e][c] < bulk->node_count) ++corners[bulk->element[e][c]];
+    for (uint32_t i = 0; i < bulk->node_count; ++i) {
+      bulk_batch *at = &size[i / SONDE_BATCH];
+      uint32_t slots = graph.start[i + 1] - graph.start[i];
+      at->slot_count = slots > at->slot_count ? slots : at->slot_count;
+      at->corner_count = corners[i] > at->corner_count ? corners[i] : at->corner_count;
+    }
+    for (uint32_t s = 0; s < batches; ++s) {
+      size[s].first_slot = tissue->slot_count, size[s].first_corner = tissue->corner_count;
+      tissue->slot_count += size[s].slot_count;
+      tissue->corner_count += size[s].corner_count;
+    }
     tissue->common.evaluated_per_slot = tissue->springs ? 34 : 18;
     tissue->common.multiplied_per_slot = 14;
     tissue->block = sonde_calloc(1, carve(tissue, batches, NULL) + 63);
