@@ -22,7 +22,7 @@ struct sonde_state {
   const sonde_model *tissue; // whose springs act: the model, or `tuned`
   sonde_nodes nodes;         // of the model
   sonde_model tuned;         // shares the model's arrays but for k0_n_m3
-  sonde_bulk tuned_bulk; // of a volumetric model, its arrays shared
+  sonde_bulk tuned_bulk;     // of a volumetric model, its arrays shared
   sonde_tuning tuning;
   sonde_world_def def;
   struct sonde_engine_data *engine; // the one that steps
