@@ -43,7 +43,7 @@ typedef struct simulation {
   sonde_file *bodies, *contacts;
   double seconds;
   uint64_t solver_iterations, most_points, awake;
-  double contact_s, assembly_s, solve_s;
+  double processor_s, contact_s, assembly_s, solve_s;
   bool cancelled;
 } simulation;
 
@@ -176,8 +176,10 @@ static sonde_status run(simulation *s, sonde_error *error) {
   sonde_status status = s->a.resume ? SONDE_OK : write_frame(s, error);
   while (!status && sonde_scene_tick(s->state) < s->steps) {
     double begin = app_seconds(CLOCK_MONOTONIC);
+    double processor = app_seconds(CLOCK_PROCESS_CPUTIME_ID);
     sonde_scene_advance(s->state);
     s->seconds += app_seconds(CLOCK_MONOTONIC) - begin;
+    s->processor_s += app_seconds(CLOCK_PROCESS_CPUTIME_ID) - processor;
     sonde_scene_report report = sonde_scene_last(s->state);
     s->solver_iterations += report.solver_iterations;
     s->awake += report.awake;
@@ -257,7 +259,8 @@ static int simulate(void *from) {
   if (!status && s.a.picture) status = scene_figure(s.scene, s.state, s.a.picture, &error);
   double steps = status ? 0 : (double)(sonde_scene_tick(s.state) - s.start);
   // Simulated over processor time of the steps.
-  double real_time = s.seconds > 0 ? steps * sonde_scene_get_step(s.scene).dt_s / s.seconds : NAN;
+  double simulated_s = steps * sonde_scene_get_step(s.scene).dt_s;
+  double real_time = s.processor_s > 0 ? simulated_s / s.processor_s : NAN;
   char trouble[320] = "";
   bool spoilt = !status && tell_faults(&s, trouble, sizeof trouble);
   if (!status && s.a.json) {

@@ -223,8 +223,8 @@ static void test_woken_by_driven(void **unused) {
   steps(&w, 1000);
   steps(&again, 1000);
   assert_true(sonde_scene_hash(w.state) == sonde_scene_hash(again.state));
-  // Where it was pushed to, and v^2/(2 mu g) further.
-  assert_near(measure(&w, "brick").centre_m.x, 0.005 + 0.04 / (2 * 0.3 * 9.81), 2e-4);
+  // Where it was pushed to, and v^2/(2 mu g) further, as it hops ahead of the pusher or not.
+  assert_near(measure(&w, "brick").centre_m.x, 0.005 + 0.04 / (2 * 0.3 * 9.81), 5e-4);
   assert_int_equal(sonde_scene_last(w.state).awake, 0);
   unlink(path);
   sonde_scene_state_destroy(again.state);

@@ -50,6 +50,13 @@ void sonde_face_tree_destroy(sonde_face_tree *tree); /**< @thread owner */
  * @thread tick
  */
 void sonde_face_tree_refit(sonde_face_tree *tree, const sonde_vec3 *vertices);
+/**
+ * The same where only some faces have moved since the last fit.
+ * @param faces [count] the mesh's numbers of them
+ * @thread tick
+ */
+void sonde_face_tree_refit_part(sonde_face_tree *tree, const sonde_vec3 *vertices,
+                                const uint32_t *faces, uint32_t count);
 /** Box of the whole mesh. @thread any (read only) */
 sonde_bounds sonde_face_tree_bounds(const sonde_face_tree *tree);
 /**

@@ -18,6 +18,7 @@ static void split(builder *b, uint32_t from, uint32_t to, int depth) {
   if (to - from <= TREE_LEAF_FACES) {
     node->first = from;
     node->count = to - from;
+    for (uint32_t i = from; i < to; ++i) b->tree->leaf[face[i]] = b->tree->node_count - 1;
     return;
   }
   sonde_bounds spread = bounds_none();
@@ -49,8 +50,11 @@ sonde_status sonde_face_tree_create(const sonde_mesh *mesh, sonde_face_tree **ou
   tree->corners = sonde_calloc(faces, sizeof *tree->corners);
   tree->face = SONDE_NEW(uint32_t, faces);
   tree->nodes = SONDE_NEW(tree_node, 2 * (size_t)faces);
+  tree->leaf = SONDE_NEW(uint32_t, faces);
+  tree->stale = SONDE_NEW(uint8_t, 2 * (size_t)faces);
   builder b = {tree, SONDE_NEW(sonde_vec3, faces), SONDE_NEW(sonde_ranked, faces)};
-  bool room = tree->corners && tree->face && tree->nodes && b.centroids && b.keys;
+  bool room = tree->corners && tree->face && tree->nodes && tree->leaf && tree->stale &&
+              b.centroids && b.keys;
   if (room) {
     for (uint32_t f = 0; f < faces; ++f) {
       const uint32_t *v = mesh->faces[f];
@@ -77,6 +81,8 @@ void sonde_face_tree_destroy(sonde_face_tree *tree) {
   sonde_free(tree->corners);
   sonde_free(tree->face);
   sonde_free(tree->nodes);
+  sonde_free(tree->leaf);
+  sonde_free(tree->stale);
   sonde_free(tree);
 }
 

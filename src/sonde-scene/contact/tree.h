@@ -21,6 +21,8 @@ struct sonde_face_tree {
   uint32_t (*corners)[3];     // [face_count] in leaf order
   uint32_t *face;             // [face_count] the mesh's number of each
   tree_node *nodes;           // [node_count]
+  uint32_t *leaf;             // [face_count] node of the mesh's face
+  uint8_t *stale;             // [node_count] scratch of a partial fit
 };
 
 struct sonde_sweep {

@@ -3,20 +3,38 @@
 
 #include "geometry/triangle.h"
 
+#include <string.h>
+
+static void fit_node(sonde_face_tree *tree, uint32_t at) {
+  tree_node *node = &tree->nodes[at];
+  if (!node->count) {
+    node->box = bounds_join(tree->nodes[at + 1].box, tree->nodes[node->first].box);
+    return;
+  }
+  sonde_bounds box = bounds_none();
+  for (uint32_t i = node->first; i < node->first + node->count; ++i)
+    for (int k = 0; k < 3; ++k) box = bounds_add(box, tree->vertices[tree->corners[i][k]]);
+  node->box = box;
+}
+
 void sonde_face_tree_refit(sonde_face_tree *tree, const sonde_vec3 *vertices) {
   SONDE_ASSERT(tree != NULL && vertices != NULL);
   tree->vertices = vertices;
+  for (uint32_t at = tree->node_count; at-- > 0;) fit_node(tree, at);
+}
+
+void sonde_face_tree_refit_part(sonde_face_tree *tree, const sonde_vec3 *vertices,
+                                const uint32_t *faces, uint32_t count) {
+  SONDE_ASSERT(tree != NULL && vertices != NULL && count <= tree->face_count);
+  tree->vertices = vertices;
+  for (uint32_t k = 0; k < count; ++k) tree->stale[tree->leaf[faces[k]]] = 1;
+  // Children stand behind their parents.
   for (uint32_t at = tree->node_count; at-- > 0;) {
-    tree_node *node = &tree->nodes[at];
-    if (!node->count) {
-      node->box = bounds_join(tree->nodes[at + 1].box, tree->nodes[node->first].box);
-      continue;
-    }
-    sonde_bounds box = bounds_none();
-    for (uint32_t i = node->first; i < node->first + node->count; ++i)
-      for (int k = 0; k < 3; ++k) box = bounds_add(box, vertices[tree->corners[i][k]]);
-    node->box = box;
+    const tree_node *node = &tree->nodes[at];
+    if (!node->count) tree->stale[at] = tree->stale[at + 1] | tree->stale[node->first];
+    if (tree->stale[at]) fit_node(tree, at);
   }
+  memset(tree->stale, 0, tree->node_count * sizeof *tree->stale);
 }
 
 sonde_bounds sonde_face_tree_bounds(const sonde_face_tree *tree) {

@@ -28,13 +28,17 @@ static sonde_bounds guess(const sonde_scene_state *state, uint32_t b, double h) 
   const sonde_body *body = &state->scene->bodies[b];
   const sonde_vec3 *v = state->now.velocity + body->first_slot;
   sonde_vec3 fall = v_scale(state->scene->gravity_m_s2, h * h);
-  if (body->motion == SONDE_BODY_FIXED) return (sonde_bounds){vec3(0, 0, 0), vec3(0, 0, 0)};
+  if (sonde_body_rests(state, b)) return (sonde_bounds){vec3(0, 0, 0), vec3(0, 0, 0)};
   if (body->motion == SONDE_BODY_DRIVEN) fall = vec3(0, 0, 0);
   if (sonde_body_is_rigid(body))
     return widen(v_madd(fall, h, v[0]), state->reach_m[b] * fmin(2, h * v_norm(v[1])));
-  sonde_bounds displacements = {v_scale(v[0], h), v_scale(v[0], h)};
-  for (uint32_t i = 1; i < body->node_count; ++i) {
-    sonde_vec3 displacement = v_scale(v[i], h);
+  // Sleeping nodes of a tissue stand still.
+  bool all = !body->model || state->part[b].row_count == body->node_count;
+  uint32_t count = all ? body->node_count : state->part[b].row_count;
+  sonde_vec3 first = all ? v_scale(v[0], h) : vec3(0, 0, 0);
+  sonde_bounds displacements = {first, first};
+  for (uint32_t r = 0; r < count; ++r) {
+    sonde_vec3 displacement = v_scale(v[all ? r : state->part[b].rows[r]], h);
     displacements = bounds_add(displacements, displacement);
   }
   return (sonde_bounds){v_low(displacements.low, v_add(displacements.low, fall)),
@@ -46,12 +50,17 @@ static sonde_bounds made(const sonde_scene_state *state, uint32_t b) {
   const sonde_vec3 *to = state->now.position + body->first_slot;
   const sonde_vec3 *from = state->undo.position + body->first_slot;
   sonde_vec3 displacement = v_sub(to[0], from[0]);
+  if (sonde_body_rests(state, b)) return (sonde_bounds){vec3(0, 0, 0), vec3(0, 0, 0)};
   if (sonde_body_is_rigid(body)) {
     sonde_quat change = q_mul(state->now.rotation[b], q_conj(state->undo.rotation[b]));
     return widen(displacement, 2 * state->reach_m[b] * v_norm(vec3(change.x, change.y, change.z)));
   }
+  bool all = !body->model || state->part[b].row_count == body->node_count;
+  uint32_t count = all ? body->node_count : state->part[b].row_count;
+  if (!all) displacement = vec3(0, 0, 0);
   sonde_bounds displacements = {displacement, displacement};
-  for (uint32_t i = 1; i < body->node_count; ++i) {
+  for (uint32_t r = 0; r < count; ++r) {
+    uint32_t i = all ? r : state->part[b].rows[r];
     displacement = v_sub(to[i], from[i]);
     displacements = bounds_add(displacements, displacement);
   }
@@ -65,7 +74,7 @@ static sonde_bounds bounds_of(sonde_scene_state *state, const sonde_scene_motion
   sonde_vec3 *surface = state->surface + state->surface_first[b];
   SONDE_ASSERT(mesh->vertex_count > 0);
   if (state->scene->bodies[b].motion != SONDE_BODY_FIXED)
-    sonde_surface_at(state, b, at->position, at->rotation, surface);
+    sonde_touch_surface(state, b, at->position, at->rotation);
   sonde_bounds box = {surface[0], surface[0]};
   for (uint32_t i = 1; i < mesh->vertex_count; ++i) box = bounds_add(box, surface[i]);
   state->cast_known[b] = true;
@@ -175,6 +184,7 @@ void sonde_step_guarded(sonde_scene_state *state, double h) {
       if (far && !(part > least)) watch(state, part);
       if (!(far && part > least)) break;
       sonde_scene_motion_copy(&state->now, &state->undo);
+      state->listed = false;
       part *= 0.5;
     }
     if (part < h) state->report.cuts++;

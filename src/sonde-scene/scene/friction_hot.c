@@ -105,15 +105,19 @@ uint32_t sonde_bonds_of(sonde_scene_state *state, uint32_t t) {
 static void pack_bonds(sonde_scene_state *state) {
   sonde_scene_motion *now = &state->now;
   uint32_t used = 0, before = now->head->bond_count;
-  memcpy(state->bond_sum, now->bond, before * sizeof *now->bond);
+  bool saved = false; // once a touch has moved
   for (uint32_t t = 0; t < state->scene->touch_count; ++t) {
     if (!now->bond_first[t]) continue;
     uint32_t first = now->bond_first[t] - 1, count = bonds_per_touch(state->scene, t);
     bool held = false;
-    for (uint32_t i = first; i < first + count; ++i) held |= state->bond_load[i] != 0;
+    for (uint32_t i = first; i < first + count && !held; ++i) held = state->bond_load[i] != 0;
     now->bond_first[t] = held ? used + 1 : 0;
     if (!held) continue;
-    memcpy(now->bond + used, state->bond_sum + first, count * sizeof *now->bond);
+    if (first != used) {
+      if (!saved) memcpy(state->bond_sum, now->bond, before * sizeof *now->bond);
+      saved = true;
+      memcpy(now->bond + used, state->bond_sum + first, count * sizeof *now->bond);
+    }
     used += count;
   }
   SONDE_ASSERT(used <= before);

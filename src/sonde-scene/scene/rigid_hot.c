@@ -108,7 +108,8 @@ static sonde_vec3 angular_at(const sonde_scene_state *state, uint32_t b, sonde_v
 void sonde_stage_at(sonde_scene_state *state, const sonde_vec3 *dv, double h) {
   double lambda = state->scene->step.lambda;
   SONDE_ASSERT(lambda >= 0 && lambda <= 1);
-  for (uint32_t i = 0; i < state->scene->slot_count; ++i) {
+  for (uint32_t r = 0; r < state->moving_count; ++r) {
+    uint32_t i = state->moving[r];
     sonde_vec3 v = v_madd(state->now.velocity[i], lambda, dv[i]);
     state->stage_velocity[i] = v;
     state->stage_position[i] = v_madd(state->now.position[i], lambda * h, v);
@@ -132,7 +133,8 @@ bool sonde_stage_finish(sonde_scene_state *state, const sonde_vec3 *dv, double h
   SONDE_ASSERT(h > 0);
   const sonde_scene_step *step = &state->scene->step;
   double lambda = step->symplectic ? 1 : step->lambda, sum = 0;
-  for (uint32_t i = 0; i < state->scene->slot_count; ++i) {
+  for (uint32_t r = 0; r < state->moving_count; ++r) {
+    uint32_t i = state->moving[r];
     sonde_vec3 mean = v_madd(state->now.velocity[i], lambda, dv[i]);
     state->now.position[i] = v_madd(state->now.position[i], h, mean);
     state->now.velocity[i] = v_add(state->now.velocity[i], dv[i]);

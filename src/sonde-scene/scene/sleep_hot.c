@@ -30,6 +30,7 @@ static bool moves(const sonde_scene_state *state, const sonde_body *body, uint32
 void sonde_sleep_list(sonde_scene_state *state) {
   const sonde_scene *scene = state->scene;
   uint32_t face = 0;
+  state->listed = true;
   state->active_row_count = state->active_pair_count = 0;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     const sonde_body *body = &scene->bodies[b];
@@ -37,13 +38,14 @@ void sonde_sleep_list(sonde_scene_state *state) {
       if (moves(state, body, k))
         state->active_rows[state->active_row_count++] = body->first_slot + k;
     uint32_t last = b + 1 < scene->body_count ? body[1].first_pair : scene->pair_count;
-    for (uint32_t e = body->first_pair; e < last; ++e)
+    for (uint32_t e = body->first_pair; e < last && !body->model; ++e)
       if (moves(state, body, scene->pairs[e][0] - body->first_slot) &&
           moves(state, body, scene->pairs[e][1] - body->first_slot))
         state->active_pairs[state->active_pair_count++] = e;
     if (!body->model) continue;
     // The waking part of a tissue: its nodes, the sleepers beside them, their springs and faces.
     const sonde_model *model = body->model;
+    bool free = body->motion == SONDE_BODY_FREE;
     const uint8_t *calm = state->now.calm + body->first_slot;
     uint32_t *rows = state->part_rows + body->first_slot, *rim = state->part_rim + body->first_slot;
     uint32_t *edges = state->part_edges + body->first_pair, *faces = state->part_faces + face;
@@ -57,6 +59,8 @@ void sonde_sleep_list(sonde_scene_state *state) {
       bool first = calm[end[0]] < CALM, second = calm[end[1]] < CALM;
       if (!first && !second) continue;
       edges[part.edge_count++] = e;
+      if (first && second && free && !body->held[end[0]] && !body->held[end[1]])
+        state->active_pairs[state->active_pair_count++] = body->first_pair + e;
       uint32_t other = first ? end[1] : end[0];
       if ((first && second) || in_rim[other]) continue;
       in_rim[other] = 1;
@@ -70,6 +74,13 @@ void sonde_sleep_list(sonde_scene_state *state) {
     face += body->surface.face_count;
   }
   SONDE_ASSERT(state->active_row_count <= scene->slot_count);
+  memcpy(state->moving, state->active_rows, state->active_row_count * sizeof *state->moving);
+  state->moving_count = state->active_row_count;
+  for (uint32_t b = 0; b < scene->body_count; ++b) {
+    if (scene->bodies[b].motion != SONDE_BODY_DRIVEN) continue;
+    state->moving[state->moving_count++] = scene->bodies[b].first_slot;
+    state->moving[state->moving_count++] = scene->bodies[b].first_slot + 1;
+  }
 }
 
 // A tissue whose forces are 0 where it starts sleeps from the start.
@@ -90,10 +101,12 @@ void sonde_sleep_begin(sonde_scene_state *state) {
   bool any = state->scene->step.sleep_m > 0 && state->scene->step.lambda > 0;
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
-    if (!any) state->now.asleep[b] = 0;
-    if (body->model && !any) memset(state->now.calm + body->first_slot, 0, body->node_count);
+    if (any) continue;
+    state->listed &= !state->now.asleep[b] && !body->model;
+    state->now.asleep[b] = 0;
+    if (body->model) memset(state->now.calm + body->first_slot, 0, body->node_count);
   }
-  sonde_sleep_list(state);
+  if (!state->listed) sonde_sleep_list(state);
 }
 
 bool sonde_sleep_wake_touched(sonde_scene_state *state) {
@@ -122,7 +135,10 @@ static void rest_nodes(sonde_scene_state *state) {
       double speed = v_norm(state->now.velocity[s]);
       const sonde_topology *t = &model->topology;
       for (uint32_t k = t->start[i]; k < t->start[i + 1] && speed > 2 * still; ++k)
-        if (calm[t->neighbour[k]] >= CALM) calm[t->neighbour[k]] = 0;
+        if (calm[t->neighbour[k]] >= CALM) {
+          calm[t->neighbour[k]] = 0;
+          state->listed = false;
+        }
       // The unbalanced force would move the node by (normal, tangent) against its anchors.
       sonde_vec3 n = model->normal[i], f = v_add(state->force[s], state->contact_force[s]);
       double along = v_dot(n, f), area = model->area_m2[i];
@@ -133,15 +149,19 @@ static void rest_nodes(sonde_scene_state *state) {
       bool at_rest = speed <= still && sqrt(normal * normal + tangent * tangent) <= displacement;
       if (!body->held[i] && !at_rest)
         calm[i] = 0;
-      else if (++calm[i] >= CALM)
+      else if (++calm[i] >= CALM) {
         state->now.velocity[s] = state->now.increment[s] = vec3(0, 0, 0);
+        state->listed = false;
+      }
     }
     // Sleepers beside waking nodes are tried in turn: their neighbours may have crept away from
     // where the sleepers found balance.
     for (uint32_t r = 0; r < part->rim_count; ++r) {
       uint32_t i = part->rim[r];
       bool tried = (i + state->now.head->tick) % TRIAL_PERIOD == 0;
-      if (tried && calm[i] >= CALM) calm[i] = CALM - 1;
+      if (!tried || calm[i] < CALM) continue;
+      calm[i] = CALM - 1;
+      state->listed = false;
     }
   }
 }
@@ -161,6 +181,7 @@ bool sonde_body_rests(const sonde_scene_state *state, uint32_t b) {
 static void wake(sonde_scene_state *state, uint32_t b) {
   state->now.asleep[b] = 0;
   state->now.calm_s[b] = 0;
+  state->listed = false;
 }
 
 bool sonde_sleep_wake_bodies(sonde_scene_state *state) {
@@ -186,6 +207,7 @@ bool sonde_sleep_wake_bodies(sonde_scene_state *state) {
       more = true;
     }
   }
+  if (woke) sonde_sleep_list(state);
   return woke;
 }
 
@@ -249,6 +271,7 @@ static void rest_bodies(sonde_scene_state *state, double h) {
     if (body->motion != SONDE_BODY_FREE || state->now.asleep[b] || keeps[root] || !held[root])
       continue;
     state->now.asleep[b] = 1;
+    state->listed = false;
     size_t bytes = body->slot_count * sizeof(sonde_vec3);
     memset(state->now.velocity + body->first_slot, 0, bytes);
     memset(state->now.increment + body->first_slot, 0, bytes);

@@ -1,6 +1,6 @@
 // Snapshots of a scene's motion: a header, the block that a step hands to the next, a checksum.
 // The numbers are written as this machine holds them (little-endian IEEE 754).
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/bounds.h"
 #include "base/maths.h"
@@ -96,7 +96,7 @@ sonde_status sonde_scene_state_load(sonde_scene_state *state, const char *path,
   }
   if (!status) {
     sonde_scene_motion_copy(&state->now, &state->undo);
-    memset(state->fitted, 0, state->scene->body_count * sizeof *state->fitted);
+    sonde_touch_forget(state);
   }
   sonde_free(bytes);
   return status;

@@ -1,5 +1,5 @@
 // A scene's motion: memory, start, measures.
-#include "scene/state.h"
+#include "scene/touch.h"
 
 #include "base/base.h"
 #include "base/maths.h"
@@ -65,6 +65,7 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) *all[k] = carve(c, slots, sizeof(sonde_vec3));
   CARVE(s->plain_diagonal, slots);
   CARVE(s->active_rows, slots);
+  CARVE(s->moving, slots);
   CARVE(s->active_pairs, scene->pair_count);
   CARVE(s->part_rows, slots);
   CARVE(s->part_rim, slots);
@@ -77,6 +78,9 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
     if (body->model && body->node_count > most) most = body->node_count;
   }
   CARVE(s->part_faces, faces);
+  CARVE(s->moved_faces, faces);
+  CARVE(s->moved_count, bodies);
+  CARVE(s->face_first, bodies);
   CARVE(s->tissue_nodes, most);
   CARVE(s->stage_rotation, bodies);
   CARVE(s->surface, s->surface_count);
@@ -164,10 +168,12 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   if (!state->block) return sonde_fail_memory(error);
   arrays.used = 0;
   lay_arrays(state, &arrays);
-  uint32_t surface = 0;
+  uint32_t surface = 0, face = 0;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     const sonde_body *body = &scene->bodies[b];
     state->surface_first[b] = surface;
+    state->face_first[b] = face;
+    face += body->surface.face_count;
     surface += body->surface.vertex_count;
     double area = 0;
     state->thickness_m[b] = sonde_mesh_thickness(&body->surface, &area);
@@ -285,7 +291,7 @@ void sonde_scene_state_reset(sonde_scene_state *state) {
   sonde_scene_motion_unbond(&state->now);
   memset(state->now.block, 0, state->now.fixed);
   state->report = (sonde_scene_report){0};
-  memset(state->fitted, 0, state->scene->body_count * sizeof *state->fitted);
+  sonde_touch_forget(state);
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     state->now.rotation[b] = quat_identity();
@@ -352,6 +358,7 @@ void sonde_scene_set_nodes(sonde_scene_state *state, uint32_t b, const sonde_vec
   if (positions) memcpy(state->now.position + body->first_slot, positions, bytes);
   if (velocities) memcpy(state->now.velocity + body->first_slot, velocities, bytes);
   memset(state->now.calm + body->first_slot, 0, body->slot_count);
+  sonde_touch_forget(state);
   state->now.asleep[b] = 0;
   state->now.calm_s[b] = 0;
 }

@@ -130,9 +130,14 @@ struct sonde_scene_state {
   sonde_vec3 *contact_force, *contact_product; // [slots]
   sonde_vec3 *residual, *change, *move, *gain; // [slots]
   sonde_vec3 *mean_velocity;                   // [slots] scratch
+  bool listed;                                 // the lists below are those of what is awake
   uint32_t *active_rows, *active_pairs;
   uint32_t active_row_count, active_pair_count;
-  sonde_tissue_part *part;                                  // [bodies] the waking part of a tissue
+  uint32_t *moving, moving_count; // the active rows and the slots of driven bodies
+  uint32_t *moved_faces;          // [faces] of tissues, at the last search for contacts
+  uint32_t *face_first;           // [bodies] in moved_faces
+  uint32_t *moved_count;          // [bodies] UINT32_MAX: all have to be looked at
+  sonde_tissue_part *part;        // [bodies] the waking part of a tissue
   uint32_t *part_rows, *part_rim, *part_edges, *part_faces; // [slots], [slots], [pairs], [faces]
   uint8_t *in_rim;                                          // [slots] scratch
   uint32_t *island;                                         // [bodies]

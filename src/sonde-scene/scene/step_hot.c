@@ -79,7 +79,8 @@ static void solve(sonde_scene_state *state, sonde_vec3 *x) {
   sonde_block_matrix *matrix = state->matrix;
   sonde_active_set active = {state->active_rows, state->active_row_count, state->active_pairs,
                              state->active_pair_count};
-  memcpy(state->plain_diagonal, matrix->diagonal, matrix->row_count * sizeof *matrix->diagonal);
+  for (uint32_t r = 0; r < active.row_count; ++r)
+    state->plain_diagonal[r] = matrix->diagonal[active.rows[r]];
   for (uint32_t t = 0; t < state->term_count; ++t) {
     const sonde_rank_one *term = &state->terms[t];
     for (uint32_t k = 0; k < term->count; ++k) {
@@ -88,7 +89,8 @@ static void solve(sonde_scene_state *state, sonde_vec3 *x) {
     }
   }
   sonde_block_invert_diagonal(matrix, &active);
-  memcpy(matrix->diagonal, state->plain_diagonal, matrix->row_count * sizeof *matrix->diagonal);
+  for (uint32_t r = 0; r < active.row_count; ++r)
+    matrix->diagonal[active.rows[r]] = state->plain_diagonal[r];
   if (step->lambda > 0) {
     memset(state->scratch.q, 0, state->scene->slot_count * sizeof(sonde_vec3));
     sonde_pcg_result result = sonde_pcg_solve(matrix, &active, state->terms, state->term_count,
@@ -126,8 +128,10 @@ static void form_residual(sonde_scene_state *state, const sonde_vec3 *dv, double
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
     bool rigid = sonde_body_is_rigid(body);
-    for (uint32_t k = 0; k < body->slot_count; ++k) {
-      uint32_t i = body->first_slot + k;
+    if (state->now.asleep[b]) continue;
+    uint32_t count = body->model ? state->part[b].row_count : body->slot_count;
+    for (uint32_t r = 0; r < count; ++r) {
+      uint32_t k = body->model ? state->part[b].rows[r] : r, i = body->first_slot + k;
       sonde_vec3 f = v_scale(v_add(state->force[i], state->contact_force[i]), h);
       if (rigid && k == 1)
         state->residual[i] = v_sub(f, m_mul_v(state->inertia[b].start, dv[i]));
@@ -143,7 +147,8 @@ static void form_residual(sonde_scene_state *state, const sonde_vec3 *dv, double
 static void moves_since(sonde_scene_state *state, const sonde_vec3 *from, const sonde_vec3 *dv,
                         double h) {
   double lambda = state->scene->step.lambda;
-  for (uint32_t i = 0; i < state->scene->slot_count; ++i) {
+  for (uint32_t r = 0; r < state->moving_count; ++r) {
+    uint32_t i = state->moving[r];
     sonde_vec3 more = from ? v_sub(dv[i], from[i]) : dv[i];
     sonde_vec3 base = from ? vec3(0, 0, 0) : state->now.velocity[i];
     state->gain[i] = v_scale(more, lambda);
@@ -257,7 +262,8 @@ void sonde_step_once(sonde_scene_state *state, double h) {
     sonde_touch_gather(state, &scales);
     // b = h (F0 - lambda h K v0)
     double scale = -h * h * state->scene->step.lambda;
-    for (uint32_t i = 0; i < state->scene->slot_count; ++i) {
+    for (uint32_t r = 0; r < state->active_row_count; ++r) {
+      uint32_t i = state->active_rows[r];
       sonde_vec3 f = v_add(state->force[i], state->contact_force[i]);
       sonde_vec3 kv = v_add(state->product[i], state->contact_product[i]);
       state->residual[i] = v_madd(v_scale(f, h), scale, kv);
@@ -272,8 +278,10 @@ void sonde_step_once(sonde_scene_state *state, double h) {
   if (state->scene->step.lambda > 0) balance(state, state->now.increment, h);
   const sonde_scene_step *step = &state->scene->step;
   double lambda = step->symplectic ? 1 : step->lambda;
-  for (uint32_t i = 0; i < state->scene->slot_count; ++i)
+  for (uint32_t r = 0; r < state->moving_count; ++r) {
+    uint32_t i = state->moving[r];
     state->mean_velocity[i] = v_madd(state->now.velocity[i], lambda, state->now.increment[i]);
+  }
   sonde_touch_finish(state, h);
   bool finite = true;
   for (uint32_t k = 0; k < state->near_touch_count; ++k) {
@@ -286,6 +294,7 @@ void sonde_step_once(sonde_scene_state *state, double h) {
     // The bodies stand still where the step began, with their contacts forgotten.
     sonde_scene_motion_head head = *state->now.head;
     sonde_scene_motion_copy(&state->now, &state->undo);
+    state->listed = false;
     state->now.head->time_s = head.time_s + h;
     state->now.head->flag_count = head.flag_count;
     state->now.head->all_flags = head.all_flags;

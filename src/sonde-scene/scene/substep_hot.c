@@ -40,6 +40,7 @@ static void adaptive(sonde_scene_state *state) {
     sonde_step_guarded(state, h);
     sonde_scene_motion_copy(&state->whole, &state->now);
     sonde_scene_motion_copy(&state->now, &state->saved);
+    state->listed = false;
     sonde_step_guarded(state, 0.5 * h);
     sonde_step_guarded(state, 0.5 * h);
     // Vertices of rigid bodies move with centre and rotation: their reach times the angle.
@@ -56,6 +57,7 @@ static void adaptive(sonde_scene_state *state) {
     double error = most / order_factor;
     if (error > tolerance && level < step->substep_halvings) {
       sonde_scene_motion_copy(&state->now, &state->saved);
+      state->listed = false;
       state->report.flags = flags;
       state->report.rejected++;
       ++level;

@@ -8,6 +8,11 @@
 // @param start the stage is the start of a step, where bodies are found wholly inside others
 // @thread tick
 void sonde_touch_find(sonde_scene_state *state, bool start);
+// Surfaces and trees are fitted as a whole at the next search: bodies were put elsewhere.
+void sonde_touch_forget(sonde_scene_state *state);
+// Vertices of a body that may have moved since the last search. @thread tick
+void sonde_touch_surface(sonde_scene_state *state, uint32_t body, const sonde_vec3 *position,
+                         const sonde_quat *rotation);
 // A push whose rows come next; NULL when there is no room. @thread tick
 sonde_push *sonde_push_new(sonde_scene_state *state, uint32_t touch);
 // Notices a body wholly inside the other of a touch. @thread tick
@@ -17,10 +22,10 @@ void sonde_release_notice(sonde_scene_state *state, uint32_t touch,
 bool sonde_release_push(sonde_scene_state *state, uint32_t touch, bool may_end);
 // Raises a flag of one body, or of one and another (UINT32_MAX: none). @thread tick
 void sonde_scene_note(sonde_scene_state *state, uint32_t flag, uint32_t body, uint32_t other);
-// Flags a deformable body of a touch when a common volume is negative; false when it is.
-// @thread tick
+// False when a common volume is negative; at the start of a step a deformable body of the touch is
+// flagged for it. @thread tick
 bool sonde_trouble_overlap(sonde_scene_state *state, uint32_t touch,
-                           const sonde_overlap_result *found);
+                           const sonde_overlap_result *found, bool start);
 // Flags a touch whose direction turned round while it was deep; at the end of a step. @thread tick
 void sonde_trouble_direction(sonde_scene_state *state, uint32_t touch);
 // Straight motion of a rigid body from the start of a step of h, in `undo`, to its end. @thread

@@ -261,8 +261,10 @@ static void find_touch(sonde_scene_state *state, uint32_t t, bool start) {
   pair->volume_m3 = found->volume_m3;
   pair->region_count = found->region_count;
   pair->point_count = found->point_count;
-  bool sound = !start || sonde_trouble_overlap(state, t, found);
+  // The columns of a body that is inside out say nothing: they are left out.
+  bool sound = sonde_trouble_overlap(state, t, found, start);
   if (start && sound) sonde_release_notice(state, t, found);
+  if (!sound) return;
   if (state->now.release[t] && sonde_release_push(state, t, start)) return;
   // The direction of the largest region is where the next search starts.
   double most = 0;
@@ -291,6 +293,52 @@ static void find_touch(sonde_scene_state *state, uint32_t t, bool start) {
   }
 }
 
+void sonde_touch_forget(sonde_scene_state *state) {
+  state->listed = false;
+  for (uint32_t b = 0; b < state->scene->body_count; ++b) {
+    state->fitted[b] = false;
+    state->moved_count[b] = UINT32_MAX;
+  }
+}
+
+// Of a tissue the waking vertices, and those that fell asleep since the last search.
+void sonde_touch_surface(sonde_scene_state *state, uint32_t b, const sonde_vec3 *position,
+                         const sonde_quat *rotation) {
+  const sonde_body *body = &state->scene->bodies[b];
+  sonde_vec3 *surface = state->surface + state->surface_first[b];
+  const sonde_vec3 *slot = position + body->first_slot;
+  if (!body->model || state->moved_count[b] == UINT32_MAX) {
+    sonde_surface_at(state, b, position, rotation, surface);
+    return;
+  }
+  SONDE_ASSERT(!body->surface_node);
+  const uint32_t *moved = state->moved_faces + state->face_first[b];
+  for (uint32_t k = 0; k < 3 * state->moved_count[b]; ++k) {
+    uint32_t i = body->surface.faces[moved[k / 3]][k % 3];
+    surface[i] = slot[i];
+  }
+  for (uint32_t r = 0; r < state->part[b].row_count; ++r)
+    surface[state->part[b].rows[r]] = slot[state->part[b].rows[r]];
+}
+
+// Surface and tree of a body at the stage.
+static void fit(sonde_scene_state *state, uint32_t b) {
+  const sonde_vec3 *surface = state->surface + state->surface_first[b];
+  const sonde_tissue_part *part = &state->part[b];
+  uint32_t *moved = state->moved_faces + state->face_first[b];
+  bool whole = !state->scene->bodies[b].model || state->moved_count[b] == UINT32_MAX;
+  sonde_touch_surface(state, b, state->stage_position, state->stage_rotation);
+  if (whole)
+    sonde_face_tree_refit(state->tree[b], surface);
+  else {
+    sonde_face_tree_refit_part(state->tree[b], surface, moved, state->moved_count[b]);
+    sonde_face_tree_refit_part(state->tree[b], surface, part->faces, part->face_count);
+  }
+  if (!state->scene->bodies[b].model) return;
+  memcpy(moved, part->faces, part->face_count * sizeof *moved);
+  state->moved_count[b] = part->face_count;
+}
+
 void sonde_touch_find(sonde_scene_state *state, bool start) {
   const sonde_scene *scene = state->scene;
   state->push_count = state->grip_count = 0;
@@ -302,13 +350,11 @@ void sonde_touch_find(sonde_scene_state *state, bool start) {
   state->near_touch_count = 0;
   // The trees of what moves are fitted; a fixed body's tree was fitted when the state was made.
   for (uint32_t b = 0; b < scene->body_count; ++b) {
-    sonde_vec3 *surface = state->surface + state->surface_first[b];
     if (!state->tree[b]) continue;
     if (scene->bodies[b].motion != SONDE_BODY_FIXED &&
         !(state->fitted[b] && state->now.asleep[b])) {
       state->fitted[b] = state->now.asleep[b];
-      sonde_surface_at(state, b, state->stage_position, state->stage_rotation, surface);
-      sonde_face_tree_refit(state->tree[b], surface);
+      fit(state, b);
     }
     state->bounds[b] = sonde_face_tree_bounds(state->tree[b]);
   }
@@ -364,9 +410,11 @@ static void add_term(sonde_scene_state *state, double scale, uint32_t first, uin
 }
 
 void sonde_touch_gather(sonde_scene_state *state, const sonde_tissue_scales *scales) {
-  size_t bytes = state->scene->slot_count * sizeof(sonde_vec3);
-  memset(state->contact_force, 0, bytes);
-  memset(state->contact_product, 0, bytes);
+  // Sums at slots that do not move are not read.
+  for (uint32_t r = 0; r < state->active_row_count; ++r) {
+    uint32_t i = state->active_rows[r];
+    state->contact_force[i] = state->contact_product[i] = vec3(0, 0, 0);
+  }
   state->term_count = state->bulk_terms;
   uint32_t rows = state->row_count;
   for (uint32_t k = 0; k < state->push_count; ++k) {

@@ -21,8 +21,8 @@ static double volume_ratio(const sonde_scene_state *state, uint32_t b) {
          body->rest_volume_m3;
 }
 
-bool sonde_trouble_overlap(sonde_scene_state *state, uint32_t t,
-                           const sonde_overlap_result *found) {
+bool sonde_trouble_overlap(sonde_scene_state *state, uint32_t t, const sonde_overlap_result *found,
+                           bool start) {
   static const double ROUNDING = 1e-9; // of the area times the thinner body's thickness
   const sonde_touch *touch = &state->scene->touches[t];
   double thickness = fmin(state->thickness_m[touch->a], state->thickness_m[touch->b]);
@@ -31,6 +31,7 @@ bool sonde_trouble_overlap(sonde_scene_state *state, uint32_t t,
   for (uint32_t r = 0; r < found->region_count; ++r)
     least = fmin(least, found->regions[r].volume_m3);
   if (least >= -ROUNDING * thickness * area) return true;
+  if (!start) return false;
   double a = volume_ratio(state, touch->a), b = volume_ratio(state, touch->b);
   sonde_scene_note(state, SONDE_SCENE_INVERTED, a < b ? touch->a : touch->b, UINT32_MAX);
   return false;
