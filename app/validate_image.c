@@ -34,7 +34,7 @@ typedef struct stage {
 
 static sonde_status stage_open(stage *s, double radius, double bone, double muscle, double depth,
                                bool vessels, sonde_error *error) {
-  assert(radius > bone && depth > 0);
+  assert(radius > bone && depth >= 0);
   *s = (stage){.view = {.aperture_m = 0.04, .settings = sonde_echo_settings_default()}};
   sonde_echo_def def = sonde_echo_def_default();
   def.plain = true;
