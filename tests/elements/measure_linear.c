@@ -93,13 +93,6 @@ int main(int argc, char **argv) {
     if (t.node[i].z < low + 1e-6 || t.node[i].z > high - 1e-6) held[i] = 4;
     if (i >= t.surface_count && i < t.surface_count + t.held_count) held[i] = 7;
   }
-  const sonde_elastic_def def = {.mesh = &t, .held = held};
-  sonde_elastic *solid;
-  stop_on(sonde_elastic_create(&def, &solid, &error), &error);
-  solid->accuracy = 1e-4; // the work of a footprint is off by its square
-  printf("%u nodes, %u tetrahedra, %.1f thousand million multiplications a factor, %.1f s\n",
-         solid->count, t.count, 1e-9 * (double)solid->symbolic->macs, sonde_clock_now() - start);
-
   // What was measured.
   static sonde_bonded_footprint prints[MOST_SITES * PROBES];
   static uint32_t nodes[MOST_SITES * PROBES][MOST_NODES];
@@ -134,6 +127,18 @@ int main(int argc, char **argv) {
       touched[p] += to->count;
       of_site[count++] = 2 * id + (uint32_t)p;
     }
+  uint32_t *last = calloc(t.surface_count, sizeof *last), last_count = 0;
+  uint8_t *listed = calloc(t.surface_count, 1);
+  for (uint32_t k = 0; k < count; ++k)
+    for (uint32_t i = 0; i < prints[k].count; ++i)
+      if (!listed[prints[k].nodes[i]]++) last[last_count++] = prints[k].nodes[i];
+  const sonde_elastic_def def = {.mesh = &t, .held = held, .last = last, .last_count = last_count};
+  sonde_elastic *solid;
+  stop_on(sonde_elastic_create(&def, &solid, &error), &error);
+  solid->accuracy = 1e-4; // the work of a footprint is off by its square
+  printf("%u nodes, %u tetrahedra, %.1f thousand million multiplications a factor, %.1f s\n",
+         solid->count, t.count, 1e-9 * (double)solid->symbolic->macs, sonde_clock_now() - start);
+
   printf("%u curves; footprints of %.0f (point) and %.0f (linear) nodes\n", count,
          2.0 * touched[0] / count, 2.0 * touched[1] / count);
   print_errors("a proportion per curve", model, taken, (const double(*)[PROBES])best);
@@ -152,6 +157,6 @@ int main(int argc, char **argv) {
   sonde_elastic_destroy(solid);
   sonde_tetrahedra_clear(&t);
   sonde_model_destroy(model);
-  free(group), free(held);
+  free(group), free(held), free(last), free(listed);
   return 0;
 }

@@ -1,5 +1,6 @@
 // Stiffness of footprints with its derivatives, and the fit of moduli to it.
 #include "elements/moduli.h"
+#include "elements/condense.h"
 #include "base/base.h"
 #include "base/maths.h"
 #include "base/parallel.h"
@@ -19,12 +20,33 @@ typedef struct fit {
   uint32_t group_count, unknowns;
   const sonde_bonded_footprint *footprints;
   uint32_t count, workers;
+  bool all_last;                   // the footprints' nodes are those that the solid numbers last
+  sonde_condensed *condensed;      // on these nodes, with the moduli at hand
   sonde_elastic_scratch **scratch; // [workers]
   double **vectors;                // [workers] force and displacement
   double *young;                   // [tetrahedra]
   double *stiffness;               // [count]
   double (*slope)[GROUPS];         // [count] by ln E
 } fit;
+
+// Forces f [3 count] of a footprint's nodes at unit depth, from the condensed compliance.
+static sonde_status find_forces(const fit *t, const sonde_bonded_footprint *p, double *f,
+                                sonde_error *error) {
+  const uint32_t first = t->elastic->count - t->elastic->last_count;
+  uint32_t *places = SONDE_NEW(uint32_t, p->count);
+  double *x = SONDE_NEW(double, 3 * (size_t)p->count);
+  sonde_status status = places && x ? SONDE_OK : sonde_fail_memory(error);
+  for (uint32_t k = 0; k < p->count && !status; ++k) {
+    places[k] = t->elastic->unknown[p->nodes[k]] - first;
+    x[3 * k] = p->inward.x, x[3 * k + 1] = p->inward.y, x[3 * k + 2] = p->inward.z;
+  }
+  if (!status) status = sonde_condensed_forces(t->condensed, places, p->count, x, x, error);
+  for (uint32_t k = 0; k < p->count && !status; ++k)
+    memcpy(f + 3 * (size_t)(first + places[k]), x + 3 * (size_t)k, 3 * sizeof *x);
+  sonde_free(places);
+  sonde_free(x);
+  return status;
+}
 
 // The work of a unit depth is the stiffness, and so are their derivatives.
 static sonde_status measure_footprint(void *user, uint32_t worker, uint32_t item,
@@ -34,18 +56,21 @@ static sonde_status measure_footprint(void *user, uint32_t worker, uint32_t item
   const sonde_elastic *e = t->elastic;
   const sonde_bonded_footprint *p = &t->footprints[item];
   const size_t n = 3 * (size_t)e->count;
-  double *f = t->vectors[worker], *u = f + n, sum = 0;
+  double *f = t->vectors[worker], *u = f + n;
   memset(f, 0, 2 * n * sizeof *f);
-  for (uint32_t k = 0; k < p->count; ++k) {
-    double *to = u + 3 * (size_t)e->unknown[p->nodes[k]];
-    to[0] = p->inward.x, to[1] = p->inward.y, to[2] = p->inward.z;
+  sonde_status status = SONDE_OK;
+  if (t->condensed) {
+    // Under known forces the factor needs a few steps only.
+    status = find_forces(t, p, f, error);
+    if (!status) status = sonde_elastic_solve(e, t->scratch[worker], NULL, 0, f, u, error);
+  } else {
+    for (uint32_t k = 0; k < p->count; ++k) {
+      double *to = u + 3 * (size_t)e->unknown[p->nodes[k]];
+      to[0] = p->inward.x, to[1] = p->inward.y, to[2] = p->inward.z;
+    }
+    status = sonde_elastic_solve(e, t->scratch[worker], p->nodes, p->count, f, u, error);
   }
-  sonde_status status = sonde_elastic_solve(e, t->scratch[worker], p->nodes, p->count, f, u, error);
-  for (uint32_t k = 0; k < p->count && !status; ++k) {
-    const double *from = f + 3 * (size_t)e->unknown[p->nodes[k]];
-    sum += v_dot(p->inward, vec3(from[0], from[1], from[2]));
-  }
-  t->stiffness[item] = sum;
+  t->stiffness[item] = sonde_dot(f, u, (uint32_t)n);
   if (!status) sonde_elastic_sensitivity(e, u, t->group, t->group_count, t->slope[item]);
   return status;
 }
@@ -59,6 +84,8 @@ static sonde_status evaluate(fit *t, const double *x, double *misfit, sonde_erro
   if (!status)
     status =
         sonde_parallel_run(t->count, t->workers, measure_footprint, t, NULL, "footprints", error);
+  sonde_condensed_destroy(t->condensed);
+  t->condensed = NULL;
   *misfit = 0;
   for (uint32_t k = 0; k < t->count && !status; ++k) {
     double off = t->stiffness[k] - t->footprints[k].stiffness_n_m;
@@ -132,6 +159,15 @@ sonde_status sonde_moduli_fit(sonde_elastic *e, double poisson, const uint32_t *
            .footprints = footprints,
            .count = count,
            .workers = sonde_parallel_workers(workers, count)};
+  t.all_last = e->last_count > 0;
+  for (uint32_t k = 0; k < count; ++k)
+    for (uint32_t i = 0; i < footprints[k].count; ++i) {
+      uint32_t node = footprints[k].nodes[i];
+      if (node >= e->mesh->node_count || e->held[node])
+        return sonde_fail(error, SONDE_ARGUMENT, "node %u of footprint %u is missing or held", node,
+                          k);
+      if (e->unknown[node] < e->count - e->last_count) t.all_last = false;
+    }
   double x[GROUPS] = {0};
   t.scratch = SONDE_NEW(sonde_elastic_scratch *, t.workers);
   t.vectors = SONDE_NEW(double *, t.workers);
