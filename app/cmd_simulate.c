@@ -39,8 +39,8 @@ typedef struct simulation {
   options a;
   sonde_scene *scene;
   sonde_scene_state *state;
-  uint64_t steps, every, start; // steps in all, and where this run began
-  sonde_file *bodies, *contacts;
+  uint64_t steps, every, start;                // steps in all, and where this run began
+  sonde_file *bodies, *contacts, *attachments; // the last only where there are any
   double seconds;
   uint64_t solver_iterations, most_points, awake;
   double processor_s, contact_s, assembly_s, solve_s;
@@ -59,6 +59,9 @@ static const char BODIES_HEAD[] =
 static const char CONTACTS_HEAD[] =
     "step,time_s,a,b,fx_n,fy_n,fz_n,tx_n_m,ty_n_m,tz_n_m,normal_n,friction_n,volume_m3,area_m2,"
     "depth_m,energy_j,regions\n";
+
+static const char ATTACHMENTS_HEAD[] =
+    "step,time_s,attachment,a,b,fx_n,fy_n,fz_n,stretch_m,energy_j\n";
 
 static void put_vector(sonde_file *table, sonde_vec3 v) {
   sonde_file_printf(table, ",%.12g,%.12g,%.12g", v.x, v.y, v.z);
@@ -164,7 +167,19 @@ static sonde_status write_frame(simulation *s, sonde_error *error) {
                       m.volume_m3, m.area_m2, m.depth_m, m.energy_j, m.region_count);
   }
 
+  for (uint32_t k = 0; k < sonde_scene_attachment_count(s->scene); ++k) {
+    sonde_attachment_measure m = sonde_scene_attachment(s->state, k);
+    const uint32_t end[2] = {m.a, m.b};
+    sonde_file_printf(s->attachments, "%llu,%.12g,%u", step, time_s, k);
+    for (int i = 0; i < 2; ++i)
+      sonde_file_printf(s->attachments, ",%s",
+                        end[i] == UINT32_MAX ? "" : sonde_scene_body(s->scene, end[i]).name);
+    put_vector(s->attachments, m.force_n);
+    sonde_file_printf(s->attachments, ",%.12g,%.12g\n", m.stretch_m, m.energy_j);
+  }
+
   status = sonde_file_flush(s->bodies, error);
+  if (!status && s->attachments) status = sonde_file_flush(s->attachments, error);
   if (!status) status = sonde_file_flush(s->contacts, error);
   return status ? status : save_snapshot(s, error);
 }
@@ -253,6 +268,8 @@ static int simulate(void *from) {
     if (!status && !s.a.no_frames) status = sonde_directory_make(path, 0777, false, &error);
     if (!status) status = open_table(&s, "bodies.csv", BODIES_HEAD, &s.bodies, &error);
     if (!status) status = open_table(&s, "contacts.csv", CONTACTS_HEAD, &s.contacts, &error);
+    if (!status && sonde_scene_attachment_count(s.scene))
+      status = open_table(&s, "attachments.csv", ATTACHMENTS_HEAD, &s.attachments, &error);
   }
   if (!status) status = run(&s, &error);
   if (!status && s.cancelled) status = save_snapshot(&s, &error);
@@ -298,6 +315,7 @@ static int simulate(void *from) {
             (unsigned long long)sonde_scene_tick(s.state), (unsigned long long)s.steps);
   sonde_file_discard(s.bodies);
   sonde_file_discard(s.contacts);
+  sonde_file_discard(s.attachments);
   sonde_scene_state_destroy(s.state);
   sonde_scene_destroy(s.scene);
   if (status) return app_fail(VERB, &error);
@@ -311,7 +329,7 @@ const app_command cmd_simulate = {
     .text =
         "Simulates a scene of several bodies with contact and friction (docs/scene.md; examples "
         "in data/scenes) and writes, into DIR, the surfaces as VTK files (open scene.pvd in "
-        "ParaView), bodies.csv, contacts.csv and a snapshot.",
+        "ParaView), bodies.csv, contacts.csv, attachments.csv where there are any, and a snapshot.",
     .tail = "Ctrl-C keeps what is finished; --resume goes on from there.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),

@@ -179,6 +179,18 @@ typedef struct sonde_pair_measure {
 SONDE_API sonde_pair_measure sonde_scene_pair_measure(const sonde_scene_state *state,
                                                       uint32_t pair); /**< @thread tick */
 
+/** An attachment of two bodies, or of one and the world, as it is now. */
+typedef struct sonde_attachment_measure {
+  uint32_t a, b;      /**< bodies; UINT32_MAX: the world */
+  sonde_vec3 force_n; /**< sum of its springs and dampers on body a */
+  double stretch_m;   /**< of the longest spring */
+  double energy_j;
+} sonde_attachment_measure;
+SONDE_API uint32_t sonde_scene_attachment_count(const sonde_scene *scene); /**< @thread any */
+/** @thread tick */
+SONDE_API sonde_attachment_measure sonde_scene_attachment(const sonde_scene_state *state,
+                                                          uint32_t attachment);
+
 /** Writes the full state atomically; a state loaded from it goes on bit by bit as this one.
  * @thread owner */
 SONDE_API sonde_status sonde_scene_state_save(const sonde_scene_state *state, const char *path,

@@ -54,6 +54,8 @@ static inline double total_energy(const world *w) {
   }
   for (uint32_t p = 0; p < sonde_scene_pair_count(w->scene); ++p)
     sum += sonde_scene_pair_measure(w->state, p).energy_j;
+  for (uint32_t k = 0; k < sonde_scene_attachment_count(w->scene); ++k)
+    sum += sonde_scene_attachment(w->state, k).energy_j;
   return sum;
 }
 

@@ -217,7 +217,8 @@ static void read_touches(sonde_reader *reader, sonde_place root, sonde_scene *sc
   }
   for (uint32_t a = 0; all && a < n; ++a)
     for (uint32_t b = a + 1; b < n; ++b)
-      if (moves(&scene->bodies[a]) || moves(&scene->bodies[b]))
+      if ((moves(&scene->bodies[a]) || moves(&scene->bodies[b])) &&
+          !sonde_bodies_attached(scene, a, b))
         add_touch(scene, touch_of(scene, a, b));
   for (uint32_t k = 0; k < listed; ++k) read_touch(reader, sonde_read_item(reader, at, k), scene);
   SONDE_ASSERT(scene->touch_count <= most);
@@ -273,8 +274,8 @@ static void read_materials(sonde_reader *reader, sonde_place root, sonde_scene *
 }
 
 static void read_scene(const sonde_scene_source *source, sonde_scene *scene) {
-  static const char *const KEYS[] = {"sonde_scene", "title",  "gravity_m_s2", "duration_s", "step",
-                                     "materials",   "bodies", "contacts",     NULL};
+  static const char *const KEYS[] = {"sonde_scene", "title",  "gravity_m_s2", "duration_s",  "step",
+                                     "materials",   "bodies", "contacts",     "attachments", NULL};
   sonde_reader *reader = source->reader;
   sonde_place root = sonde_reader_root(reader);
   sonde_read_keys(reader, root, "a scene", KEYS);
@@ -289,6 +290,7 @@ static void read_scene(const sonde_scene_source *source, sonde_scene *scene) {
   read_step(reader, sonde_read_find(reader, root, "step"), scene);
   read_materials(reader, root, scene);
   read_bodies(source, root, scene);
+  if (sonde_reader_good(reader)) sonde_read_attachments(reader, root, scene);
   if (sonde_reader_good(reader)) read_touches(reader, root, scene);
   // Bodies that may touch have to bound a solid.
   for (uint32_t i = 0; i < scene->body_count; ++i) {
@@ -380,5 +382,6 @@ void sonde_scene_destroy(sonde_scene *scene) {
   sonde_free(scene->touches);
   sonde_free(scene->materials);
   sonde_free(scene->pairs);
+  sonde_free(scene->pins);
   sonde_free(scene);
 }

@@ -73,6 +73,19 @@ typedef struct sonde_touch {
   int bond_side; // 0: bonds live on the vertices of a, 1: of b
 } sonde_touch;
 
+// Where a pin holds a body: a node, or a point of the frame of a rigid body's centre.
+typedef struct sonde_pin_end {
+  uint32_t body;    // UINT32_MAX: the world
+  uint32_t node;    // UINT32_MAX: rigid, or the world
+  sonde_vec3 local; // rigid: from the centre in the body's axes; the world: the place
+} sonde_pin_end;
+
+typedef struct sonde_pin {
+  sonde_pin_end end[2];
+  double stiffness_n_m, damping_n_s_m;
+  uint32_t attachment;
+} sonde_pin;
+
 struct sonde_scene {
   char title[128];
   sonde_vec3 gravity_m_s2;
@@ -82,6 +95,8 @@ struct sonde_scene {
   sonde_body *bodies;
   sonde_touch *touches;
   sonde_material *materials;
+  sonde_pin *pins;
+  uint32_t pin_count, attachment_count;
   uint32_t slot_count, pair_count;
   uint32_t (*pairs)[2]; // [pair_count] slots
   uint64_t checksum;
@@ -107,6 +122,9 @@ typedef struct sonde_scene_source {
 void sonde_read_body(const sonde_scene_source *source, sonde_place at, const sonde_scene *scene,
                      sonde_body *body);
 void sonde_body_clear(sonde_body *body);
+// Reads `attachments`, after the bodies.
+void sonde_read_attachments(sonde_reader *reader, sonde_place root, sonde_scene *scene);
+bool sonde_bodies_attached(const sonde_scene *scene, uint32_t a, uint32_t b);
 // Reads `shape` into a mesh (about the body's frame, m).
 void sonde_read_shape(const sonde_scene_source *source, sonde_place at, sonde_mesh *mesh);
 // Path of a file named in the scene.

@@ -195,7 +195,7 @@ bool sonde_sleep_wake_bodies(sonde_scene_state *state) {
     wake(state, state->now.asleep[touch->a] ? touch->a : touch->b);
   }
   // Bodies that rest with one that woke wake as well.
-  for (bool more = woke; more;) {
+  for (bool more = woke || scene->pin_count; more;) {
     more = false;
     for (uint32_t t = 0; t < scene->touch_count; ++t) {
       uint32_t a = scene->touches[t].a, b = scene->touches[t].b;
@@ -205,6 +205,15 @@ bool sonde_sleep_wake_bodies(sonde_scene_state *state) {
       if (scene->bodies[other].motion != SONDE_BODY_FREE) continue;
       wake(state, sleeper);
       more = true;
+    }
+    for (uint32_t k = 0; k < scene->pin_count; ++k) {
+      uint32_t a = scene->pins[k].end[0].body, b = scene->pins[k].end[1].body;
+      if (a == UINT32_MAX || b == UINT32_MAX || state->now.asleep[a] == state->now.asleep[b])
+        continue;
+      uint32_t sleeper = state->now.asleep[a] ? a : b, other = sleeper == a ? b : a;
+      if (sonde_body_rests(state, other)) continue;
+      wake(state, sleeper);
+      more = woke = true;
     }
   }
   if (woke) sonde_sleep_list(state);
@@ -246,6 +255,14 @@ static void rest_bodies(sonde_scene_state *state, double h) {
         scene->bodies[touch->b].motion == SONDE_BODY_FREE)
       group[a > b ? a : b] = a > b ? b : a;
   }
+  for (uint32_t k = 0; k < scene->pin_count; ++k) {
+    uint32_t p = scene->pins[k].end[0].body, q = scene->pins[k].end[1].body;
+    if (p == UINT32_MAX || q == UINT32_MAX || scene->bodies[p].motion != SONDE_BODY_FREE ||
+        scene->bodies[q].motion != SONDE_BODY_FREE)
+      continue;
+    uint32_t a = group_of(group, p), b = group_of(group, q);
+    group[a > b ? a : b] = a > b ? b : a;
+  }
   bool *keeps = state->keeps_awake, *held = state->is_held;
   for (uint32_t b = 0; b < bodies; ++b) keeps[b] = held[b] = false;
   for (uint32_t b = 0; b < bodies; ++b) {
@@ -262,6 +279,16 @@ static void rest_bodies(sonde_scene_state *state, double h) {
     if (!state->now.pair[state->near_touch[k]].region_count || (free_a && free_b)) continue;
     uint32_t root = group_of(group, free_a ? touch->a : touch->b);
     bool rests = sonde_body_rests(state, free_a ? touch->b : touch->a);
+    keeps[root] |= !rests;
+    held[root] |= rests;
+  }
+  for (uint32_t k = 0; k < 2 * scene->pin_count; ++k) {
+    uint32_t b = scene->pins[k / 2].end[k % 2].body, other = scene->pins[k / 2].end[1 - k % 2].body;
+    if (b == UINT32_MAX || other == UINT32_MAX || scene->bodies[b].motion != SONDE_BODY_FREE ||
+        scene->bodies[other].motion == SONDE_BODY_FREE)
+      continue;
+    uint32_t root = group_of(group, b);
+    bool rests = sonde_body_rests(state, other);
     keeps[root] |= !rests;
     held[root] |= rests;
   }

@@ -146,10 +146,11 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   uint32_t pairs = scene->touch_count, room = points < most ? (uint32_t)points : most;
   if (pairs > NEIGHBOURS * bodies) pairs = NEIGHBOURS * bodies;
   state->grip_capacity = room;
-  state->push_capacity = room + REGIONS * pairs;
+  state->push_capacity = room + REGIONS * pairs + 3 * scene->pin_count;
   state->term_capacity = state->push_capacity + 2 * room + bodies;
   state->bulk_row_capacity = bulk;
   state->row_capacity = bulk + 3 * 8 * room + 2 * state->surface_count + 4 * state->push_capacity;
+  SONDE_ASSERT(state->row_capacity >= bulk + 12 * scene->pin_count);
   uint64_t shared = NEIGHBOURS * (uint64_t)state->surface_count;
   state->bond_capacity = (uint32_t)(bonds < shared ? bonds : shared);
   state->near_capacity = scene->body_count * (scene->body_count - 1) / 2;
@@ -266,6 +267,10 @@ sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_stat
     state->loose[b] = body->motion == SONDE_BODY_FREE && !body->model;
     for (uint32_t k = 0; k < body->node_count; ++k) state->loose[b] &= !body->held[k];
   }
+  for (uint32_t k = 0; k < scene->pin_count; ++k)
+    for (int s = 0; s < 2; ++s)
+      if (scene->pins[k].end[1 - s].body == UINT32_MAX)
+        state->loose[scene->pins[k].end[s].body] = false;
   sonde_sleep_list(state);
   *out = state;
   return SONDE_OK;

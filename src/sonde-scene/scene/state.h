@@ -47,7 +47,8 @@ typedef struct sonde_scene_motion {
 // A push of one body on another along generalised coordinates: a quantity u (depth of a column or
 // volume of a region) grows at the rate sum g.v, and the force on the slots is -f g.
 typedef struct sonde_push {
-  uint32_t touch, first_row, row_count;
+  uint32_t touch; // UINT32_MAX: an attachment, which may pull
+  uint32_t first_row, row_count;
   double value, end_value;  // u at the evaluation and at the end of the step
   double newtons;           // |sum of g on one side|: f times this is the push in N
   double stiffness, damper; // df/du, df/d(du/dt); both 0 where nothing pushes

@@ -223,6 +223,12 @@ static void balance(sonde_scene_state *state, sonde_vec3 *dv, double h) {
     uint32_t b = island_of(state->island, scene->touches[t].b);
     state->island[a > b ? a : b] = a > b ? b : a;
   }
+  for (uint32_t k = 0; k < scene->pin_count; ++k) {
+    uint32_t p = scene->pins[k].end[0].body, q = scene->pins[k].end[1].body;
+    if (p == UINT32_MAX || q == UINT32_MAX) continue;
+    uint32_t a = island_of(state->island, p), b = island_of(state->island, q);
+    state->island[a > b ? a : b] = a > b ? b : a;
+  }
   form_residual(state, dv, h);
   for (uint32_t root = 0; root < scene->body_count; ++root) {
     sonde_vec3 sum = vec3(0, 0, 0);

@@ -343,6 +343,7 @@ void sonde_touch_find(sonde_scene_state *state, bool start) {
   const sonde_scene *scene = state->scene;
   state->push_count = state->grip_count = 0;
   state->row_count = state->bulk_row_capacity;
+  sonde_pins_push(state);
   if (!scene->touch_count) return;
   for (uint32_t k = 0; k < state->near_touch_count; ++k)
     if (!sonde_touch_rests(state, state->near_touch[k]))
@@ -389,8 +390,9 @@ void sonde_touch_evaluate(sonde_scene_state *state, double moved_s) {
     sonde_push *push = &state->pushes[k];
     double rate = along_rows(state, push, state->stage_velocity);
     push->force = push->stiffness * push->value + push->damper * rate;
-    push->dropped = !(push->force > 0);
-    if (push->dropped) push->force = 0; // damping never pulls
+    // An attachment may pull; a contact's damping never does.
+    push->dropped = push->touch != UINT32_MAX && !(push->force > 0);
+    if (push->dropped) push->force = 0;
     push->end_force = push->force;
     push->end_value = push->value;
   }
@@ -457,7 +459,7 @@ uint32_t sonde_touch_predict(sonde_scene_state *state) {
     if (push->dropped) continue;
     push->end_force = push->force + push->stiffness * displacement +
                       push->damper * along_rows(state, push, state->gain);
-    if (push->end_force >= 0) continue;
+    if (push->end_force >= 0 || push->touch == UINT32_MAX) continue;
     push->dropped = true;
     push->end_force = 0;
     ++dropped;
@@ -471,6 +473,7 @@ void sonde_touch_finish(sonde_scene_state *state, double h) {
   // Forces and torques about the world's origin follow from the rows of a's and b's slots.
   for (uint32_t k = 0; k < state->push_count; ++k) {
     const sonde_push *push = &state->pushes[k];
+    if (push->touch == UINT32_MAX) continue;
     const sonde_touch *touch = &state->scene->touches[push->touch];
     sonde_pair_measure *pair = &state->now.pair[push->touch];
     const sonde_body *a = body_of(state, touch->a), *b = body_of(state, touch->b);
