@@ -110,6 +110,7 @@ static sonde_status work(paper *p, sonde_error *error) {
     done += PARTS[k].seconds;
   }
   app_progress_end();
+  paper_sort(p);
   return status;
 }
 

@@ -98,6 +98,8 @@ sonde_status paper_figure_end(sonde_file *drawing, sonde_status status, sonde_er
 // Everything found as one JSON object. @param drawings with the text of the figures
 sonde_status paper_put_json(const paper *p, bool drawings, sonde_json_layout layout, char **json,
                             size_t *length, sonde_error *error);
+// The claims in the order of the paper's sections; within one as they were begun.
+void paper_sort(paper *p);
 const char *paper_verdict_text(paper_verdict verdict);
 // Path of a file in the directory.
 void paper_path(const paper *p, const char *name, char *path, size_t room);

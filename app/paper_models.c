@@ -256,7 +256,7 @@ static sonde_status measure_shear2(paper *p, outcome *out, sonde_error *error) {
   return measure_shear(p, 2, out, error);
 }
 
-// Every model of the table.
+// Every model of the table. Finite elements have "elements" in their key.
 static const candidate CANDIDATES[] = {
     {"linear_springs", "Linear springs F = kx, one per site", measure_lines, false},
     {"normal_springs", "Normal springs of eq. (1), no surface", measure_springs, false},
@@ -333,10 +333,10 @@ static sonde_status measure_candidate(paper *p, const candidate *m, paper_table 
                             percent_of(&seen, NULL),
                             percent_of(&third, NULL),
                             percent_of(&left_out, NULL),
-                            out.estimate_s,
-                            p->model->surface.vertex_count,
                             setup_ms,
-                            step_ms};
+                            step_ms,
+                            out.estimate_s,
+                            p->model->surface.vertex_count};
     paper_row(table, m->key, m->name, cells);
   }
   free(out.seen_n);
@@ -384,12 +384,37 @@ static void judge_third(paper *p, const paper_table *t) {
             third, third / seen, seen, paper_third, paper_seen);
 }
 
+// Time of a step of the fastest finite elements of the table, if it has any, against springs.
+static void judge_elements(paper *p, const paper_table *t) {
+  double springs_ms = cell_of(t, "two_layer_paper", "step_ms"), elements_ms = INFINITY;
+  for (uint32_t r = 0; r < t->row_count; ++r)
+    if (strstr(t->row[r].key, "elements"))
+      elements_ms = fmin(elements_ms, cell_of(t, t->row[r].key, "step_ms"));
+  paper_claim *c = paper_begin(p, "elements_slower", "2",
+                               "Inter-connected springs are faster than finite elements, though "
+                               "matrices computed beforehand "
+                               "have sped these up.",
+                               "Time of a step of the models of the table, at equal nodes.");
+  paper_samples(c, t->row_count, "models");
+  paper_value(c, "springs_ms", springs_ms);
+  paper_value(c, "elements_ms", elements_ms);
+  if (!isfinite(elements_ms))
+    paper_say(c, PAPER_OPEN,
+              "The table has no finite elements yet; a step of springs takes %.3f ms.", springs_ms);
+  else
+    paper_say(c, springs_ms < elements_ms ? PAPER_HOLDS : PAPER_FAILS,
+              "A step of springs takes %.3f ms, of the fastest finite elements %.3f ms.",
+              springs_ms, elements_ms);
+}
+
 static sonde_status judge_one_probe(paper *p, sonde_error *error) {
   sonde_error_report report;
   double *model_n = malloc(p->measurements.count * sizeof *model_n);
+  sonde_fit_def def = p->fit_def;
+  def.max_iterations = 20; // one probe leaves directions open, in which a search wanders
   sonde_status status = model_n ? SONDE_OK : (error->status = SONDE_MEMORY);
   if (!status)
-    status = sonde_fit_hold_out(p->model, &p->sites, &p->measurements, &p->fit_def, &p->fit,
+    status = sonde_fit_hold_out(p->model, &p->sites, &p->measurements, &def, &p->fit,
                                 SONDE_HOLD_OUT_PROBE, &p->progress, model_n, error);
   if (!status)
     status =
@@ -417,8 +442,8 @@ sonde_status paper_models(paper *p, sonde_error *error) {
       p, "models", "Deformable models on the same measurements",
       "parameters|parameters\nmae_n|MAE, N\nsd_n|SD, N\nlinear_percent|linear, %\n"
       "point_percent|point, %\nboth_percent|both, %\nthird_percent|third footprint, %\n"
-      "left_out_percent|sites left out, %\nestimate_s|estimation, s\nnodes|nodes\n"
-      "setup_ms|set-up, ms\nstep_ms|step, ms");
+      "left_out_percent|sites left out, %\nsetup_ms|set-up, ms\nstep_ms|step, ms\n"
+      "estimate_s|estimation, s\nnodes|nodes");
   paper_caption(
       t->caption, sizeof t->caption,
       "Errors are mean absolute errors, in %% of the mean force. Linear, point, both: rows "
@@ -434,5 +459,6 @@ sonde_status paper_models(paper *p, sonde_error *error) {
       status = measure_candidate(p, &CANDIDATES[k], t, error);
   if (status) return status;
   judge_third(p, t);
+  judge_elements(p, t);
   return judge_one_probe(p, error);
 }

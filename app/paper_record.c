@@ -40,6 +40,17 @@ void paper_value(paper_claim *claim, const char *key, double value) {
   claim->value[claim->value_count++].value = value;
 }
 
+void paper_sort(paper *p) {
+  for (uint32_t i = 1; i < p->claim_count; ++i) {
+    paper_claim claim = p->claim[i];
+    size_t length = strcspn(claim.section, ",");
+    uint32_t k = i;
+    for (; k > 0 && strncmp(p->claim[k - 1].section, claim.section, length) > 0; --k)
+      p->claim[k] = p->claim[k - 1];
+    p->claim[k] = claim;
+  }
+}
+
 void paper_say(paper_claim *claim, paper_verdict verdict, const char *format, ...) {
   claim->verdict = verdict;
   va_list list;

@@ -47,13 +47,22 @@ static sonde_status time_press(const paper *p, times *t, sonde_error *error) {
       t->all_s += stage.contact_s + stage.assembly_s + stage.solve_s + stage.update_s;
     }
     if (k % every || k / every >= t->frames) continue;
-    start = app_seconds(CLOCK_THREAD_CPUTIME_ID);
-    sonde_interior_update(s.interior,
-                          &(sonde_interior_input){sonde_state_positions(state),
-                                                  sonde_state_contact_forces(state), pose, &vein,
-                                                  0.01, k, s.probe.half_x_m, s.probe.half_y_m});
-    sonde_echo_render(echo, pose, 2 * s.probe.half_x_m, &vein, &settings, &image);
-    t->frame_s[k / every] = app_seconds(CLOCK_THREAD_CPUTIME_ID) - start;
+    const sonde_interior_input skin = {sonde_state_positions(state),
+                                       sonde_state_contact_forces(state),
+                                       pose,
+                                       &vein,
+                                       0.01,
+                                       k,
+                                       s.probe.half_x_m,
+                                       s.probe.half_y_m};
+    double *best_s = &t->frame_s[k / every];
+    *best_s = INFINITY; // of three: other work on the machine slows single ones
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      start = app_seconds(CLOCK_THREAD_CPUTIME_ID);
+      sonde_interior_update(s.interior, &skin);
+      sonde_echo_render(echo, pose, 2 * s.probe.half_x_m, &vein, &settings, &image);
+      *best_s = fmin(*best_s, app_seconds(CLOCK_THREAD_CPUTIME_ID) - start);
+    }
   }
   sonde_state_destroy(state);
   sonde_echo_destroy(echo);

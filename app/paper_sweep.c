@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FRAMES = 25, QUICK_FRAMES = 9, SIDE = 300, STACK_STEP = 2 };
+enum { FRAMES = 25, QUICK_FRAMES = 9, SIDE = 300, STACK_STEP = 4 };
 static const double SPACING_M = 1e-3, APERTURE_M = 0.036, DEPTH_M = 0.045, WITHIN_M = 2e-3;
 
 // Frames of the thigh at rest along the leg, the face just within the skin so that gel fills no
@@ -67,7 +67,7 @@ static sonde_status interpolate(const sonde_sequence *sweep, double place, uint3
 static sonde_status draw_stack(paper *p, const sonde_sequence *sweep, sonde_image *picture,
                                uint8_t *known, sonde_error *error) {
   const char *TITLE = "Figure 1. An image made from a set of images";
-  double place = 0.5 * (sweep->count - 1) + 0.5;
+  double place = 0.5 * (sweep->count - 1) + 2.5; // half way between two sheets that are drawn
   sonde_affine plane;
   sonde_image stack = {0};
   sonde_file *file = NULL;
@@ -84,7 +84,7 @@ static sonde_status draw_stack(paper *p, const sonde_sequence *sweep, sonde_imag
   paper_caption(
       p->figure[0].caption, sizeof p->figure[0].caption,
       "A synthetic sweep, made by the simulator on the thigh at rest: %u frames of %.0f "
-      "x %.0f mm at %.1f mm along the leg, every second one drawn dimmed, the way between "
+      "x %.0f mm at %.1f mm along the leg, every fourth one drawn dimmed, the way between "
       "them stretched. The white frame, half way between two of them, is interpolated "
       "from the others.",
       sweep->count, 1e3 * DEPTH_M, 1e3 * DEPTH_M, 1e3 * SPACING_M);

@@ -96,9 +96,20 @@ const GROUPS = {
       return values
     },
   },
+  paper: {
+    sources: ['src/sonde-fit', 'src/sonde-scene', 'src/sonde-sweep', 'src/sonde/geometry', 'src/sonde/echo', 'src/sonde/interior', ...engine,
+      ...['collision', 'curves', 'fit', 'models', 'pressed', 'solvers', 'speed', 'steps', 'sweep'].map(name => `app/paper_${name}.c`), 'data/thigh'],
+    measure(bin) {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-'))
+      const started = Date.now(), values = json(bin, 'paper', '-o', folder)
+      values.minutes = (Date.now() - started) / 60000
+      rmSync(folder, { recursive: true })
+      return values
+    },
+  },
   // Programs that print tables; the documents show what they print.
-  solver: { sources: [...engine, 'bench/bench_solver.c'], measure: bin => ({ output: run(bin, 'bench_solver') }) },
-  accuracy: { sources: [...engine, 'bench/bench_accuracy.c'], measure: bin => ({ output: run(bin, 'bench_accuracy', '1962') }) },
+  solver: { sources: [...engine, 'app/solver_cost.c', 'bench/bench_solver.c'], measure: bin => ({ output: run(bin, 'bench_solver') }) },
+  accuracy: { sources: [...engine, 'app/step_cost.c', 'bench/bench_accuracy.c'], measure: bin => ({ output: run(bin, 'bench_accuracy', '1962') }) },
   step: {
     sources: [...engine, 'src/sonde/haptics'],
     measure(bin) {
@@ -200,6 +211,14 @@ const BLOCKS = {
   frame: ({ image }) => table(['kernels', 'frame', '99 %', 'plane', 'medium', 'scatterers', 'beam', 'picture'],
     ['avx512', 'avx2', 'sse4', 'base'].map(name => [name, ...['frame_ms', 'p99_ms'].map(key => fixed(image[name][key], 1)),
       ...['plane', 'medium', 'scatter', 'beam', 'picture'].map(key => fixed(image[name][key], 2))])),
+  // The claims of a section of the paper: "2", "3.1", ...
+  ...Object.fromEntries(['1', '2', '3.1', '3.2', '4.1', '4.2', '5'].map(section => [`paper_${section.replace('.', '_')}`, ({ paper }) =>
+    table(['the paper', 'what came out', ''], Object.values(paper.claims).filter(c => c.section.split(',')[0] === section)
+      .map(c => [`${c.sentence}${c.section.includes(',') ? ` (${c.section.split(', ').slice(1).join(', ')})` : ''}`, c.found, `**${c.verdict}**`]))])),
+  paper_models: ({ paper }) => table(['model', 'parameters', 'MAE / SD', 'linear', 'point', 'both', 'third footprint', 'sites left out', 'step'],
+    Object.values(paper.tables.models.rows).map(r => [r.name, r.parameters, `${fixed(r.mae_n, 2)} / ${fixed(r.sd_n, 2)} N`,
+      ...['linear', 'point', 'both', 'third', 'left_out'].map(key => `${fixed(r[`${key}_percent`], 2)} %`), `${fixed(r.step_ms, 2)} ms`])),
+  paper_figures: ({ paper }) => table(['figure', 'what it shows'], Object.values(paper.figures).map(f => [f.title.replace(/\..*/, ''), f.caption])),
   solver: ({ solver }) => fenced(solver.output),
   accuracy: ({ accuracy }) => fenced(accuracy.output),
 }

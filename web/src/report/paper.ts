@@ -68,7 +68,7 @@ function showClaims(page: Page, report: PaperReport): void {
     return { cells: [mark(c.verdict), h("span", { id: `claim-${id}` }, c.sentence, h("small", {}, ` (${c.section})`)), c.done, c.found, h("span", {}, ...samples)] };
   };
   page.table(section, {
-    caption: "A row for each claim of the paper, in the order of the work. The sentences are shortened; the section of the paper stands behind them. n: what was counted.",
+    caption: "A row for each claim, in the order of the paper\u2019s sections. The sentences are shortened; the section stands behind them. n: what was counted.",
     columns: heads,
     rows: Object.entries(report.claims).map(([id, claim]) => row(id, claim)),
   });
