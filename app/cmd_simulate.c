@@ -276,7 +276,7 @@ static int simulate(void *from) {
   if (!status && s.a.picture) status = scene_figure(s.scene, s.state, s.a.picture, &error);
   double steps = status ? 0 : (double)(sonde_scene_tick(s.state) - s.start);
   // Simulated over processor time of the steps.
-  double simulated_s = steps * sonde_scene_get_step(s.scene).dt_s;
+  double simulated_s = status ? 0 : steps * sonde_scene_get_step(s.scene).dt_s;
   double real_time = s.processor_s > 0 ? simulated_s / s.processor_s : NAN;
   char trouble[320] = "";
   bool spoilt = !status && tell_faults(&s, trouble, sizeof trouble);

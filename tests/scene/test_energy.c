@@ -64,6 +64,7 @@ static void test_shipped(void **unused) {
   falls(DATA, "stack", 600, 1e-9);
   falls(DATA, "incline", 600, 1e-9);
   falls(DATA, "four_kinds", ROUNDS(800, 100), 1e-9);
+  falls(DATA, "drape", ROUNDS(600, 60), 1e-9);
   falls(DATA, "thigh_drop", ROUNDS(300, 30), 1e-9);
 }
 

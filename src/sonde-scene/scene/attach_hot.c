@@ -36,6 +36,29 @@ static bool end_rests(const sonde_scene_state *state, const sonde_pin_end *end) 
   return end->body == UINT32_MAX || sonde_body_rests(state, end->body);
 }
 
+// A crease's push grows with the angle between its faces.
+void sonde_creases_push(sonde_scene_state *state) {
+  for (uint32_t b = 0; b < state->scene->body_count; ++b) {
+    const sonde_body *body = &state->scene->bodies[b];
+    for (uint32_t k = 0; k < body->crease_count && !state->now.asleep[b]; ++k) {
+      const sonde_crease *crease = &body->crease[k];
+      sonde_vec3 gradient[4];
+      double angle = sonde_crease_angle(crease, state->stage_position + body->first_slot, gradient);
+      sonde_push *push = sonde_push_new(state, UINT32_MAX);
+      if (!push) return;
+      push->value = angle - crease->rest_rad;
+      push->stiffness = crease->stiffness_n_m;
+      push->damper = crease->damper_n_m_s;
+      for (int i = 0; i < 4; ++i) {
+        SONDE_ASSERT(state->row_count < state->row_capacity);
+        state->rows[state->row_count] = body->first_slot + crease->node[i];
+        state->g[state->row_count++] = gradient[i];
+      }
+      push->row_count = 4;
+    }
+  }
+}
+
 void sonde_pins_push(sonde_scene_state *state) {
   for (uint32_t k = 0; k < state->scene->pin_count; ++k) {
     const sonde_pin *pin = &state->scene->pins[k];

@@ -59,7 +59,9 @@ static double read_surface_mass(sonde_reader *reader, sonde_place at, const sond
 }
 
 void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
-  static const char *const KEYS[] = {"stiffness_n_m", "damping_n_s_m", "bulk_n_m5", NULL};
+  static const char *const KEYS[] = {
+      "stiffness_n_m", "damping_n_s_m",     "bulk_n_m5", "thickness_mm",
+      "bending_n_m",   "bending_damping_s", NULL};
   sonde_reader *reader = source->reader;
   sonde_topology topology = {0};
   sonde_error error = {0};
@@ -95,6 +97,7 @@ void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_
         sum += body->node_mass_kg[i];
       }
       body->node_mass_kg[body->node_count - 1] += mass_kg - sum;
+      sonde_read_sheet(reader, springs, body);
     }
   }
   sonde_topology_clear(&topology);

@@ -132,6 +132,12 @@ double sonde_network_energy(const sonde_body *body, const sonde_vec3 *position) 
     double stretch = v_distance(position[pair[0]], position[pair[1]]) - body->spring[e].rest_m;
     energy += 0.5 * body->spring[e].stiffness_n_m * stretch * stretch;
   }
+  for (uint32_t k = 0; k < body->crease_count; ++k) {
+    sonde_vec3 gradient[4];
+    double bent =
+        sonde_crease_angle(&body->crease[k], position, gradient) - body->crease[k].rest_rad;
+    energy += 0.5 * body->crease[k].stiffness_n_m * bent * bent;
+  }
   if (body->bulk_n_m5 > 0) {
     double change = sonde_network_volume(body, position) - body->rest_volume_m3;
     energy += 0.5 * body->bulk_n_m5 * change * change;

@@ -30,6 +30,16 @@ static void read_primitive(sonde_reader *reader, const char *key, sonde_place va
     sonde_shape_box(size, edge_m, mesh, error);
     bool slab = key[0] == 's'; // its top lies at z = 0
     for (uint32_t i = 0; slab && i < mesh->vertex_count; ++i) mesh->vertices[i].z -= 0.5 * size.z;
+  } else if (strcmp(key, "sheet_mm") == 0) {
+    if (sonde_read_count(reader, value) != 2) {
+      sonde_reader_fail(reader, value, SONDE_FORMAT, "sheet_mm must be two lengths [x, y]");
+      return;
+    }
+    double side[2];
+    for (uint32_t k = 0; k < 2; ++k)
+      side[k] = 1e-3 * sonde_read_real_at(reader, sonde_read_item(reader, value, k), key, 1e-3,
+                                          SONDE_SCENE_FAR_MM);
+    if (sonde_reader_good(reader)) sonde_shape_sheet(side[0], side[1], edge_m, mesh, error);
   } else if (strcmp(key, "sphere_mm") == 0) {
     double radius = 1e-3 * sonde_read_real_at(reader, value, key, 1e-3, SONDE_SCENE_FAR_MM);
     if (sonde_reader_good(reader))
@@ -47,14 +57,14 @@ static void read_primitive(sonde_reader *reader, const char *key, sonde_place va
 
 void sonde_read_shape(const sonde_scene_source *source, sonde_place at, sonde_mesh *mesh) {
   sonde_reader *reader = source->reader;
-  static const char *const KEYS[] = {"box_mm",       "slab_mm",     "sphere_mm",
-                                     "ellipsoid_mm", "cylinder_mm", "mesh",
-                                     "probe",        "edge_mm",     NULL};
+  static const char *const KEYS[] = {"box_mm",      "slab_mm", "sphere_mm", "ellipsoid_mm",
+                                     "cylinder_mm", "mesh",    "probe",     "sheet_mm",
+                                     "edge_mm",     NULL};
   static const char *const MESH_KEYS[] = {"file", "unit_mm", NULL};
   sonde_read_keys(reader, at, "shape", KEYS);
   double edge_m = 1e-3 * sonde_read_real(reader, at, "edge_mm", 0, SONDE_SCENE_FAR_MM, 0);
   const char *found = NULL;
-  for (int k = 0; k < 7 && sonde_reader_good(reader); ++k)
+  for (int k = 0; k < 8 && sonde_reader_good(reader); ++k)
     if (sonde_read_find(reader, at, KEYS[k])) {
       if (found)
         sonde_reader_fail(reader, at, SONDE_FORMAT, "shape has both %s and %s", found, KEYS[k]);
@@ -356,5 +366,6 @@ void sonde_body_clear(sonde_body *body) {
   sonde_free(body->load_n);
   sonde_free(body->pairs);
   sonde_free(body->spring);
+  sonde_free(body->crease);
   sonde_model_destroy(body->model);
 }

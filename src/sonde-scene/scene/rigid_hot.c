@@ -168,6 +168,10 @@ void sonde_surface_at(const sonde_scene_state *state, uint32_t b, const sonde_ve
   SONDE_ASSERT(b < state->scene->body_count && vertices);
   const sonde_body *body = &state->scene->bodies[b];
   const sonde_vec3 *slot = position + body->first_slot;
+  if (body->offset_m > 0) {
+    sonde_sheet_surface(body, slot, vertices);
+    return;
+  }
   for (uint32_t i = 0; i < body->surface.vertex_count; ++i) {
     if (sonde_body_is_rigid(body))
       vertices[i] = v_add(slot[0], q_rotate(rotation[b], body->surface.vertices[i]));

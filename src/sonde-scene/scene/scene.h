@@ -20,6 +20,13 @@ typedef struct sonde_spring {
   double rest_m, stiffness_n_m, damper_n_s_m;
 } sonde_spring;
 
+// Bending of a sheet at an edge: moment stiffness * (angle - rest) + damper * rate between the
+// faces.
+typedef struct sonde_crease {
+  uint32_t node[4]; // the edge's ends, then the corners opposite
+  double rest_rad, stiffness_n_m, damper_n_m_s;
+} sonde_crease;
+
 // How a body meets others.
 typedef struct sonde_material {
   char name[64];
@@ -52,13 +59,16 @@ typedef struct sonde_body {
 
   // deformable
   uint32_t node_count, spring_count;
-  sonde_vec3 *node;      // [nodes] where they start
-  double *node_mass_kg;  // [nodes]
-  uint8_t *held;         // [nodes]
-  sonde_vec3 *load_n;    // [nodes] constant force
-  uint32_t (*pairs)[2];  // [springs] first < second
-  sonde_spring *spring;  // [springs]
-  double bulk_n_m5;      // pressure per change of volume; 0: none
+  sonde_vec3 *node;     // [nodes] where they start
+  double *node_mass_kg; // [nodes]
+  uint8_t *held;        // [nodes]
+  sonde_vec3 *load_n;   // [nodes] constant force
+  uint32_t (*pairs)[2]; // [springs] first < second
+  sonde_spring *spring; // [springs]
+  uint32_t crease_count;
+  sonde_crease *crease; // [creases] of a sheet
+  double offset_m;  // of a sheet: half its thickness; surface vertices stand so far off their nodes
+  double bulk_n_m5; // pressure per change of volume; 0: none
   double rest_volume_m3; // closed
   uint32_t first_pair;
   sonde_model *model; // two-layer
@@ -132,6 +142,12 @@ void sonde_source_path(const sonde_scene_source *source, const char *name, char 
 
 // Nodes, springs, masses and surface of a lattice (entry `lattice` of a body).
 void sonde_read_lattice(const sonde_scene_source *source, sonde_place at, sonde_body *body);
+// Gives a sheet thickness: a closed surface around its nodes, and creases (entry `sheet`).
+void sonde_read_sheet(sonde_reader *reader, sonde_place springs, sonde_body *body);
+// Vertices of a sheet's surface, upper side first, off its nodes. @thread tick
+void sonde_sheet_surface(const sonde_body *body, const sonde_vec3 *node, sonde_vec3 *vertices);
+// Angle between the faces at a crease, 0 when flat, and its gradient by the four nodes.
+double sonde_crease_angle(const sonde_crease *crease, const sonde_vec3 *x, sonde_vec3 gradient[4]);
 // Springs of a surface from its edges (entry `springs`).
 void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_body *body);
 
@@ -147,6 +163,9 @@ sonde_status sonde_shape_box(sonde_vec3 size_m, double edge_m, sonde_mesh *mesh,
                              sonde_error *error);
 sonde_status sonde_shape_ellipsoid(sonde_vec3 radii_m, double edge_m, sonde_mesh *mesh,
                                    sonde_error *error);
+// Flat, in the plane z = 0, open.
+sonde_status sonde_shape_sheet(double x_m, double y_m, double edge_m, sonde_mesh *mesh,
+                               sonde_error *error);
 sonde_status sonde_shape_cylinder(double radius_m, double length_m, double edge_m, sonde_mesh *mesh,
                                   sonde_error *error);
 

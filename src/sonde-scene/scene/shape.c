@@ -131,6 +131,27 @@ sonde_status sonde_shape_ellipsoid(sonde_vec3 radii, double edge_m, sonde_mesh *
   return SONDE_OK;
 }
 
+sonde_status sonde_shape_sheet(double x_m, double y_m, double edge_m, sonde_mesh *mesh,
+                               sonde_error *error) {
+  SONDE_ASSERT(x_m > 0 && y_m > 0);
+  uint32_t n[2] = {1, 1};
+  sonde_status status = cells(x_m, edge_m, 400, &n[0], error);
+  if (!status) status = cells(y_m, edge_m, 400, &n[1], error);
+  if (!status) status = sonde_mesh_create(mesh, (n[0] + 1) * (n[1] + 1), 2 * n[0] * n[1], error);
+  if (status) return status;
+  for (uint32_t i = 0; i < mesh->vertex_count; ++i)
+    mesh->vertices[i] = vec3((1.0 * (i % (n[0] + 1)) / n[0] - 0.5) * x_m,
+                             (1.0 * (i / (n[0] + 1)) / n[1] - 0.5) * y_m, 0);
+  for (uint32_t f = 0; f < n[0] * n[1]; ++f) {
+    uint32_t first = f / n[0] * (n[0] + 1) + f % n[0], turn = (f % n[0] + f / n[0]) & 1u;
+    const uint32_t corner[4] = {first, first + 1, first + n[0] + 2, first + n[0] + 1};
+    for (uint32_t k = 0; k < 2; ++k)
+      for (uint32_t c = 0; c < 3; ++c)
+        mesh->faces[2 * f + k][c] = corner[(turn + (c ? c + k : 0)) & 3u];
+  }
+  return SONDE_OK;
+}
+
 typedef struct cylinder {
   uint32_t around, along, rings; // segments of a circle, of the side, and of a cap's radius
   double radius_m, length_m;

@@ -128,10 +128,11 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   // Room for contact: columns with a push and two tangents each, regions over all vertices twice.
   const sonde_scene *scene = state->scene;
   uint64_t points = 0, bonds = 0;
-  uint32_t bulk = 0, bodies = scene->body_count;
+  uint32_t bulk = 0, creases = 0, bodies = scene->body_count;
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     state->surface_count += scene->bodies[b].surface.vertex_count;
     bulk += scene->bodies[b].node_count;
+    creases += scene->bodies[b].crease_count;
   }
   for (uint32_t t = 0; t < scene->touch_count; ++t) {
     const sonde_body *a = &scene->bodies[scene->touches[t].a];
@@ -146,11 +147,11 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   uint32_t pairs = scene->touch_count, room = points < most ? (uint32_t)points : most;
   if (pairs > NEIGHBOURS * bodies) pairs = NEIGHBOURS * bodies;
   state->grip_capacity = room;
-  state->push_capacity = room + REGIONS * pairs + 3 * scene->pin_count;
+  state->push_capacity = room + REGIONS * pairs + 3 * scene->pin_count + creases;
   state->term_capacity = state->push_capacity + 2 * room + bodies;
   state->bulk_row_capacity = bulk;
   state->row_capacity = bulk + 3 * 8 * room + 2 * state->surface_count + 4 * state->push_capacity;
-  SONDE_ASSERT(state->row_capacity >= bulk + 12 * scene->pin_count);
+  SONDE_ASSERT(state->row_capacity >= bulk + 12 * scene->pin_count + 4 * creases);
   uint64_t shared = NEIGHBOURS * (uint64_t)state->surface_count;
   state->bond_capacity = (uint32_t)(bonds < shared ? bonds : shared);
   state->near_capacity = scene->body_count * (scene->body_count - 1) / 2;

@@ -17,6 +17,8 @@ void sonde_touch_surface(sonde_scene_state *state, uint32_t body, const sonde_ve
 sonde_push *sonde_push_new(sonde_scene_state *state, uint32_t touch);
 // The pushes of attachments, before those of contacts. @thread tick
 void sonde_pins_push(sonde_scene_state *state);
+// The same of creases. @thread tick
+void sonde_creases_push(sonde_scene_state *state);
 // Notices a body wholly inside the other of a touch. @thread tick
 void sonde_release_notice(sonde_scene_state *state, uint32_t touch,
                           const sonde_overlap_result *found);

@@ -344,6 +344,7 @@ void sonde_touch_find(sonde_scene_state *state, bool start) {
   state->push_count = state->grip_count = 0;
   state->row_count = state->bulk_row_capacity;
   sonde_pins_push(state);
+  sonde_creases_push(state);
   if (!scene->touch_count) return;
   for (uint32_t k = 0; k < state->near_touch_count; ++k)
     if (!sonde_touch_rests(state, state->near_touch[k]))

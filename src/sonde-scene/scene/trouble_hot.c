@@ -15,7 +15,7 @@ void sonde_scene_note(sonde_scene_state *state, uint32_t flag, uint32_t body, ui
 // Volume now over that at the start.
 static double volume_ratio(const sonde_scene_state *state, uint32_t b) {
   const sonde_body *body = &state->scene->bodies[b];
-  if (sonde_body_is_rigid(body) || body->model) return 1;
+  if (sonde_body_is_rigid(body) || body->model || body->offset_m > 0) return 1;
   SONDE_ASSERT(body->rest_volume_m3 > 0);
   return sonde_network_volume(body, state->stage_position + body->first_slot) /
          body->rest_volume_m3;
@@ -107,7 +107,9 @@ void sonde_trouble_way(sonde_scene_state *state, uint32_t t, double h) {
 void sonde_trouble_inspect(sonde_scene_state *state) {
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
-    if (sonde_body_is_rigid(body) || body->model || !body->closed || state->now.asleep[b]) continue;
+    if (sonde_body_is_rigid(body) || body->model || body->offset_m > 0 || !body->closed ||
+        state->now.asleep[b])
+      continue;
     double volume = sonde_network_volume(body, state->now.position + body->first_slot);
     if (!(volume > 0)) sonde_scene_note(state, SONDE_SCENE_INVERTED, b, UINT32_MAX);
   }
