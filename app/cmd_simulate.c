@@ -279,7 +279,7 @@ static int simulate(void *from) {
   double simulated_s = status ? 0 : steps * sonde_scene_get_step(s.scene).dt_s;
   double real_time = s.processor_s > 0 ? simulated_s / s.processor_s : NAN;
   char trouble[320] = "";
-  bool spoilt = !status && tell_faults(&s, trouble, sizeof trouble);
+  bool spoilt = !status && tell_faults(&s, trouble, sizeof trouble), trusted = !spoilt;
   if (!status && s.a.json) {
     app_json_begin();
     app_json("title:%s bodies:%u steps:%lu time_s:%g ms_per_step:%g solver_iterations_per_step:%g "
@@ -295,7 +295,7 @@ static int simulate(void *from) {
              steps > 0 ? 1e3 * s.solve_s / steps : NAN);
     char hash[24];
     snprintf(hash, sizeof hash, "%016llx", (unsigned long long)sonde_scene_hash(s.state));
-    app_json("hash:%s cancelled:%hhd trusted:%hhd trouble:%s", hash, s.cancelled, !spoilt, trouble);
+    app_json("hash:%s cancelled:%hhd trusted:%hhd trouble:%s", hash, s.cancelled, trusted, trouble);
     app_json_end();
   }
   if (!status && !s.a.json) {
