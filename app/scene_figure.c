@@ -44,13 +44,6 @@ static bool are_near(const group *a, const group *b) {
   return sqrt(sum) <= FAR * fmax(width_of(a), width_of(b));
 }
 
-static group join(const group *a, const group *b) {
-  group g = {.bodies = a->bodies + b->bodies, .fixed = a->fixed || b->fixed};
-  for (int k = 0; k < 3; ++k)
-    g.low[k] = fmin(a->low[k], b->low[k]), g.high[k] = fmax(a->high[k], b->high[k]);
-  return g;
-}
-
 // Bodies near each other make a group, and the group of most bodies is what the view shows: one
 // body that fell off does not shrink the others to a dot. Of equal groups the one with a body that
 // does not move is shown, else the wider one. Each group is found at its first body.
@@ -76,7 +69,12 @@ static bool choose_seen(figure *f) {
     for (uint32_t a = 0; a < count; ++a)
       for (uint32_t b = a + 1; b < count; ++b) {
         if (of[a] != a || of[b] != b || !are_near(&groups[a], &groups[b])) continue;
-        groups[a] = join(&groups[a], &groups[b]);
+        for (int k = 0; k < 3; ++k) {
+          groups[a].low[k] = fmin(groups[a].low[k], groups[b].low[k]);
+          groups[a].high[k] = fmax(groups[a].high[k], groups[b].high[k]);
+        }
+        groups[a].bodies += groups[b].bodies;
+        groups[a].fixed |= groups[b].fixed;
         for (uint32_t k = 0; k < count; ++k) of[k] = of[k] == b ? a : of[k];
         joined = true;
       }

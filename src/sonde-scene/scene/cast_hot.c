@@ -153,12 +153,6 @@ static double safe_share(sonde_scene_state *state, const sonde_scene_motion *fro
   return share;
 }
 
-// After a step that went further than it should: which bodies may have passed through others.
-static void watch(sonde_scene_state *state, double h) {
-  for (uint32_t t = 0; t < state->scene->touch_count; ++t)
-    if (share_of(state, t, &state->undo, h) < 1) sonde_trouble_way(state, t, h);
-}
-
 void sonde_step_guarded(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
   if (!state->scene->touch_count) {
@@ -181,7 +175,9 @@ void sonde_step_guarded(sonde_scene_state *state, double h) {
       sonde_step_once(state, part);
       for (uint32_t b = 0; b < bodies; ++b) state->displacement[b] = made(state, b);
       bool far = safe_share(state, &state->undo, part) < 1;
-      if (far && !(part > least)) watch(state, part);
+      // A step that went further than it should: bodies may have passed through others.
+      for (uint32_t t = 0; t < state->scene->touch_count && far && !(part > least); ++t)
+        if (share_of(state, t, &state->undo, part) < 1) sonde_trouble_way(state, t, part);
       if (!(far && part > least)) break;
       sonde_scene_motion_copy(&state->now, &state->undo);
       state->listed = false;

@@ -220,15 +220,6 @@ bool sonde_sleep_wake_bodies(sonde_scene_state *state) {
   return woke;
 }
 
-static double speed_of(const sonde_scene_state *state, uint32_t b) {
-  const sonde_body *body = &state->scene->bodies[b];
-  const sonde_vec3 *v = state->now.velocity + body->first_slot;
-  double most2 = 0;
-  if (sonde_body_is_rigid(body)) return v_norm(v[0]) + state->reach_m[b] * v_norm(v[1]);
-  for (uint32_t i = 0; i < body->node_count; ++i) most2 = fmax(most2, v_norm2(v[i]));
-  return sqrt(most2);
-}
-
 static uint32_t group_of(const uint32_t *group, uint32_t b) {
   while (group[b] != b) b = group[b];
   return b;
@@ -245,7 +236,11 @@ static void rest_bodies(sonde_scene_state *state, double h) {
     const sonde_body *body = &scene->bodies[b];
     group[b] = b;
     if (body->motion != SONDE_BODY_FREE || body->model || state->now.asleep[b]) continue;
-    state->now.calm_s[b] = speed_of(state, b) <= still ? state->now.calm_s[b] + h : 0;
+    const sonde_vec3 *v = state->now.velocity + body->first_slot;
+    bool rigid = sonde_body_is_rigid(body);
+    double fastest = rigid ? v_norm(v[0]) + state->reach_m[b] * v_norm(v[1]) : 0;
+    for (uint32_t i = 0; i < body->node_count && !rigid; ++i) fastest = fmax(fastest, v_norm(v[i]));
+    state->now.calm_s[b] = fastest <= still ? state->now.calm_s[b] + h : 0;
   }
   for (uint32_t k = 0; k < state->near_touch_count; ++k) {
     const sonde_touch *touch = &scene->touches[state->near_touch[k]];

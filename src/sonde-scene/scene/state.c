@@ -198,11 +198,6 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   return SONDE_OK;
 }
 
-static bool makes_three_columns(const sonde_scene *scene, const sonde_touch *touch) {
-  return touch->law == SONDE_TOUCH_FOUNDATION && sonde_body_is_rigid(&scene->bodies[touch->a]) &&
-         sonde_body_is_rigid(&scene->bodies[touch->b]);
-}
-
 // The common volumes of all pairs are found one after the other in the same memory, which has room
 // for the largest pair: large faces of rigid bodies carry three columns per piece, others one.
 static sonde_status make_overlaps(sonde_scene_state *state, sonde_error *error) {
@@ -212,7 +207,9 @@ static sonde_status make_overlaps(sonde_scene_state *state, sonde_error *error) 
   sonde_status status = SONDE_OK;
   for (uint32_t t = 0; t < scene->touch_count && !status; ++t) {
     const sonde_touch *touch = &scene->touches[t];
-    int k = makes_three_columns(scene, touch);
+    bool rigid = sonde_body_is_rigid(&scene->bodies[touch->a]) &&
+                 sonde_body_is_rigid(&scene->bodies[touch->b]);
+    int k = touch->law == SONDE_TOUCH_FOUNDATION && rigid;
     const uint32_t ends[2] = {touch->a, touch->b};
     uint32_t pieces = 0;
     for (int s = 0; s < 2 && !status; ++s) {
