@@ -19,10 +19,13 @@ typedef struct outcome {
   sonde_site *sites; // [p->sites.count]
 } outcome;
 
+// A row of the table: springs of some stage of the estimation, or a measurement of its own.
 typedef struct candidate {
   const char *key, *name;
-  sonde_status (*measure)(paper *p, outcome *out, sonde_error *error);
-  bool is_long; // left out by --quick
+  uint32_t stages; // 0: straight lines; 1, 2: of the paper; 3: with shear, at equilibrium
+  double exponent; // of the normal springs of stage 3
+  sonde_status (*measure)(paper *p, outcome *out, sonde_error *error); // NULL: by stages
+  bool is_long;                                                        // left out by --quick
 } candidate;
 
 // Some rows of a table; the rows' arrays are borrowed from the caller's copy.
@@ -52,11 +55,6 @@ static void copy_rows(const paper *p, row_filter keep, uint32_t fold, uint32_t f
 }
 
 // ---- springs that need no equilibrium: an estimate of law and sites, and simplified predictions
-
-// Estimates from some measurements; sites that have none keep k0 = 0.
-typedef sonde_status (*estimator)(const paper *p, const sonde_measurements *some,
-                                  sonde_surface_law *law, sonde_site *sites, uint32_t *parameters,
-                                  sonde_error *error);
 
 // The model with other parameters: those of the sites that have any, carried over the skin.
 static sonde_status remake(const paper *p, const sonde_surface_law *law, const sonde_site *sites,
@@ -120,9 +118,12 @@ static sonde_status estimate_lines(const paper *p, const sonde_measurements *som
   return status;
 }
 
-static sonde_status estimate_stage(const paper *p, uint32_t stages, const sonde_measurements *some,
-                                   sonde_surface_law *law, sonde_site *sites, uint32_t *parameters,
-                                   sonde_error *error) {
+// From some measurements: straight lines (0 stages), normal springs (1), the paper's model (2).
+// Sites that were not measured get k0 = 0.
+static sonde_status estimate(const paper *p, uint32_t stages, const sonde_measurements *some,
+                             sonde_surface_law *law, sonde_site *sites, uint32_t *parameters,
+                             sonde_error *error) {
+  if (stages == 0) return estimate_lines(p, some, law, sites, parameters, error);
   sonde_fit_def def = p->fit_def;
   sonde_fit_result r = {0};
   def.stages = stages;
@@ -157,27 +158,15 @@ static sonde_status estimate_stage(const paper *p, uint32_t stages, const sonde_
   return status;
 }
 
-static sonde_status estimate_springs(const paper *p, const sonde_measurements *some,
-                                     sonde_surface_law *law, sonde_site *sites,
-                                     uint32_t *parameters, sonde_error *error) {
-  return estimate_stage(p, 1, some, law, sites, parameters, error);
-}
-
-static sonde_status estimate_two_layer(const paper *p, const sonde_measurements *some,
-                                       sonde_surface_law *law, sonde_site *sites,
-                                       uint32_t *parameters, sonde_error *error) {
-  return estimate_stage(p, 2, some, law, sites, parameters, error);
-}
-
-// Errors of an estimator on what it saw, on the third footprint, and on folds of sites left out,
+// Errors of an estimate on what it saw, on the third footprint, and on folds of sites left out,
 // each by an estimate from the others.
-static sonde_status measure_simplified(paper *p, estimator estimate, outcome *out,
+static sonde_status measure_simplified(paper *p, uint32_t stages, outcome *out,
                                        sonde_error *error) {
   enum { FOLDS = 8 };
   uint32_t count = p->measurements.count, ignored;
   double start = app_seconds(CLOCK_PROCESS_CPUTIME_ID);
   sonde_status status =
-      estimate(p, &p->measurements, &out->law, out->sites, &out->parameters, error);
+      estimate(p, stages, &p->measurements, &out->law, out->sites, &out->parameters, error);
   out->estimate_s = app_seconds(CLOCK_PROCESS_CPUTIME_ID) - start;
   if (!status)
     status = predict(p, &out->law, out->sites, &p->measurements, SONDE_INTERACTION_SIMPLIFIED,
@@ -198,7 +187,7 @@ static sonde_status measure_simplified(paper *p, estimator estimate, outcome *ou
   for (uint32_t f = 0; f < FOLDS && !status; ++f) {
     sonde_surface_law law;
     copy_rows(p, is_outside_fold, f, FOLDS, &some, row);
-    status = estimate(p, &some, &law, sites, &ignored, error);
+    status = estimate(p, stages, &some, &law, sites, &ignored, error);
     copy_rows(p, is_in_fold, f, FOLDS, &some, row);
     if (!status)
       status = predict(p, &law, sites, &some, SONDE_INTERACTION_SIMPLIFIED, fold_n, error);
@@ -211,16 +200,6 @@ static sonde_status measure_simplified(paper *p, estimator estimate, outcome *ou
   free(fold_n);
   free(sites);
   return status;
-}
-
-static sonde_status measure_lines(paper *p, outcome *out, sonde_error *error) {
-  return measure_simplified(p, estimate_lines, out, error);
-}
-static sonde_status measure_springs(paper *p, outcome *out, sonde_error *error) {
-  return measure_simplified(p, estimate_springs, out, error);
-}
-static sonde_status measure_two_layer(paper *p, outcome *out, sonde_error *error) {
-  return measure_simplified(p, estimate_two_layer, out, error);
 }
 
 // ---- the two-layer model with shear and in-plane layers, at equilibrium
@@ -249,20 +228,20 @@ static sonde_status measure_shear(paper *p, double exponent, outcome *out, sonde
   return status;
 }
 
-static sonde_status measure_shear1(paper *p, outcome *out, sonde_error *error) {
-  return measure_shear(p, 1, out, error);
-}
-static sonde_status measure_shear2(paper *p, outcome *out, sonde_error *error) {
-  return measure_shear(p, 2, out, error);
-}
-
 // Every model of the table. Finite elements have "elements" in their key.
 static const candidate CANDIDATES[] = {
-    {"linear_springs", "Linear springs F = kx, one per site", measure_lines, false},
-    {"normal_springs", "Normal springs of eq. (1), no surface", measure_springs, false},
-    {"two_layer_paper", "Two layers, as in the paper (stage 2)", measure_two_layer, false},
-    {"two_layer_shear_eq1", "Two layers, shear and in-plane, eq. (1)", measure_shear1, true},
-    {"two_layer_shear", "Two layers, shear and in-plane, n = 2", measure_shear2, false}};
+    {.key = "linear_springs", .name = "Linear springs F = kx, one per site"},
+    {.key = "normal_springs", .name = "Normal springs of eq. (1), no surface", .stages = 1},
+    {.key = "two_layer_paper", .name = "Two layers, as in the paper (stage 2)", .stages = 2},
+    {.key = "two_layer_shear_eq1",
+     .name = "Two layers, shear and in-plane, eq. (1)",
+     .stages = 3,
+     .exponent = 1,
+     .is_long = true},
+    {.key = "two_layer_shear",
+     .name = "Two layers, shear and in-plane, n = 2",
+     .stages = 3,
+     .exponent = 2}};
 enum { CANDIDATE_COUNT = sizeof CANDIDATES / sizeof *CANDIDATES };
 
 // ---- time
@@ -317,7 +296,12 @@ static sonde_status measure_candidate(paper *p, const candidate *m, paper_table 
   sonde_status status = out.seen_n && out.left_out_n && out.third_n && out.sites
                             ? SONDE_OK
                             : (error->status = SONDE_MEMORY);
-  if (!status) status = m->measure(p, &out, error);
+  if (!status && m->measure)
+    status = m->measure(p, &out, error);
+  else if (!status && m->stages == 3)
+    status = measure_shear(p, m->exponent, &out, error);
+  else if (!status)
+    status = measure_simplified(p, m->stages, &out, error);
   if (!status) status = sonde_error_report_of(p->measurements.data, out.seen_n, rows, &seen, error);
   if (!status)
     status = sonde_error_report_of(p->third.data, out.third_n, p->third.count, &third, error);

@@ -76,24 +76,24 @@ static void judge_press(paper *p, times *t) {
   double step_s = app_quantile(t->step_s, t->steps, 0.5);
   double slow_s = app_quantile(t->step_s, t->steps, 0.99);
   double image_s = app_quantile(t->frame_s, t->frames, 0.5);
-  double frame_s = FRAME_S / sonde_session_def_default().world.dt_s * step_s + image_s;
+  double animation_s = FRAME_S / sonde_session_def_default().world.dt_s * step_s;
   double share = 100 * t->contact_s / t->all_s;
   uint32_t nodes = p->model->surface.vertex_count;
-  paper_claim *c =
-      paper_begin(p, "frames_per_second", "5",
-                  "The speed is in the order of 100 frames per second of animation (on an R10000).",
-                  "Processor time of one core: the step of the whole thigh while the flat probe is "
-                  "pressed to 20 "
-                  "mm, and a frame of ten such steps with the echographic image.");
+  paper_claim *c = paper_begin(
+      p, "frames_per_second", "5",
+      "The speed is in the order of 100 frames per second of animation (on an R10000).",
+      "Processor time of one core: a frame of ten steps of 1 ms of the whole thigh while the flat "
+      "probe is pressed to 20 mm; and the same with the echographic image of each frame.");
   paper_samples(c, t->steps, "steps");
   paper_value(c, "nodes", nodes);
   paper_value(c, "steps_per_s", 1 / step_s);
   paper_value(c, "image_ms", 1e3 * image_s);
-  paper_value(c, "frames_per_s", 1 / frame_s);
-  paper_say(c, 1 / frame_s >= 100 ? PAPER_HOLDS : PAPER_IN_PART,
-            "%u nodes: %.0f steps per second; as frames of ten steps and an image %.0f per second, "
-            "the image alone takes %.1f ms.",
-            nodes, 1 / step_s, 1 / frame_s, 1e3 * image_s);
+  paper_value(c, "animation_per_s", 1 / animation_s);
+  paper_value(c, "with_image_per_s", 1 / (animation_s + image_s));
+  paper_say(c, 1 / animation_s >= 100 ? PAPER_HOLDS : PAPER_FAILS,
+            "%u nodes: %.0f frames per second of animation. The paper's frames hold no echographic "
+            "image; with one, which takes %.1f ms, %.0f.",
+            nodes, 1 / animation_s, 1e3 * image_s, 1 / (animation_s + image_s));
 
   c = paper_begin(p, "real_time", "5",
                   "The speed lets us envisage a working simulator that operates in real time.",

@@ -30,6 +30,7 @@ list+=" $(checks_of slices_interpolate 'ssim>=0.35 psnr_db>=20 verdict=holds')"
 list+=" $(checks_of penalty_suits 'contact_steps>=5 restitution>=0 restitution<=1 energy_gain_j<=1e-9')"
 list+=" $(checks_of penalty_suits 'impulse_momentum_error<=1e-15 impulse_momentum_error>=-1e-15')"
 list+=" $(checks_of penalty_suits 'impulse_energy_error<=1e-12 impulse_energy_error>=-1e-12')"
+list+=" $(checks_of contact_linear 'volume_error_percent<=1 verdict=holds')"
 list+=" $(checks_of explicit_diverges 'farthest_percent<=2 verdict=holds')"
 list+=" $(checks_of larger_steps_outweigh 'step_ratio>=2')"
 list+=" $(checks_of elements_slower 'springs_ms:number')"
@@ -44,7 +45,7 @@ for row in linear_springs normal_springs two_layer_paper two_layer_shear; do
   done
 done
 list+=" tables.models.rows.two_layer_shear.third_percent<=2.6 tables.models.rows.linear_springs.both_percent>=20"
-for table in contact stability integration solvers distance; do list+=" tables.$table.title:text tables.$table.rows:object"; done
+for table in contact volume stability integration solvers distance; do list+=" tables.$table.title:text tables.$table.rows:object"; done
 for k in 1 2 3 4 5 6 7 8; do list+=" figures.fig$k.title:text figures.fig$k.caption:text figures.fig$k.bytes>=10000"; done
 gives "$list" paper "$MODEL" -o paper --quick --json
 
