@@ -153,6 +153,17 @@ static void seed_scenes(void) {
   sonde_scene *scene = NULL;
   sonde_scene_state *state = NULL;
   put_text("scene", "kinds.yaml", '0', FUZZ_SCENE);
+  put_text("scene", "joints.yaml", '0',
+           "sonde_scene: 1\ngravity_m_s2: [0, 0, -9.81]\nbodies:\n"
+           "- {name: box, shape: {box_mm: [40, 40, 40]}, mass_kg: 1}\n"
+           "- {name: in, shape: {sphere_mm: 8}, mass_kg: 0.1, position_mm: [3, 2, 1]}\n"
+           "- {name: rod, shape: {box_mm: [50, 5, 5]}, mass_kg: 0.1, position_mm: [45, 0, 40]}\n"
+           "- {name: s, kind: springs, shape: {sheet_mm: [40, 20], edge_mm: 10}, position_mm: "
+           "[0, 0, 23], mass_kg: 0.01, springs: {stiffness_n_m: 100, thickness_mm: 2, "
+           "bending_n_m: 1e-3, bending_damping_s: 0.01}}\n"
+           "attachments:\n- {bodies: [rod], points_mm: [[70, 0, 40], [70, 5, 40]]}\n"
+           "- {bodies: [s, rod], box_mm: [[19, -10, 22], [20, 10, 24]], stiffness_n_m: 1e3, "
+           "damping_n_s_m: 1}\n");
   put_text("scene", "leg.yaml", '0',
            "sonde_scene: 1\nbodies:\n- {name: leg, kind: two_layer, model: thigh}\n"
            "- {name: block, shape: {mesh: {file: body.ply}}, mass_kg: 0.1, "
