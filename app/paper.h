@@ -109,6 +109,7 @@ void paper_path(const paper *p, const char *name, char *path, size_t room);
 sonde_status paper_curves(paper *p, sonde_error *error);    // figures 4 and 5
 sonde_status paper_fit(paper *p, sonde_error *error);       // figure 7
 sonde_status paper_models(paper *p, sonde_error *error);    // the table `models`
+sonde_status paper_bulk(paper *p, sonde_error *error);      // the table `volumetric`
 sonde_status paper_drawings(paper *p, sonde_error *error);  // figures 3 and 6
 sonde_status paper_pressed(paper *p, sonde_error *error);   // figure 8
 sonde_status paper_sweep(paper *p, sonde_error *error);     // figures 1 and 2

@@ -15,17 +15,18 @@ extern "C" {
 enum { SONDE_BULK_PARAMETERS = 6 };
 
 typedef struct sonde_fit_bulk_def {
-  uint32_t version;      /**< SONDE_DEF_VERSION, from sonde_fit_bulk_def_default() */
-  sonde_model_kind kind; /**< a volumetric one; default linear solid */
-  double edge_m;         /**< mean edge of the mesh at the skin; default 15 mm */
-  double fine_edge_m;    /**< within fine_reach_m of a measured site; default 5 mm */
-  double fine_reach_m;   /**< default 5 mm */
-  double growth;         /**< of the edges per metre of depth; default 1 */
-  double poisson;        /**< of solids; default 0.45 */
-  uint32_t sites;        /**< that the moduli are sought on, spread over the skin; default 8 */
-  uint32_t depths;       /**< of each of their curves; default 3 */
-  uint32_t max_steps;    /**< of Levenberg-Marquardt; default 12 */
-  uint32_t threads;      /**< 0, the default: one per online core */
+  uint32_t version;          /**< SONDE_DEF_VERSION, from sonde_fit_bulk_def_default() */
+  sonde_model_kind kind;     /**< a volumetric one; default linear solid */
+  double edge_m;             /**< mean edge of the mesh at the skin; default 15 mm */
+  double fine_edge_m;        /**< within fine_reach_m of a measured site; default 5 mm */
+  double fine_reach_m;       /**< default 5 mm */
+  double growth;             /**< of the edges per metre of depth; default 1 */
+  double poisson;            /**< of solids; default 0.45 */
+  uint32_t sites;            /**< that the moduli are sought on, spread over the skin; default 8 */
+  uint32_t depths;           /**< of each of their curves; default 3 */
+  uint32_t max_steps;        /**< of Levenberg-Marquardt; default 12 */
+  const sonde_model *layers; /**< whose depths of fat and muscle count; NULL: the definition's */
+  uint32_t threads;          /**< 0, the default: one per online core */
 } sonde_fit_bulk_def;
 
 SONDE_API sonde_fit_bulk_def sonde_fit_bulk_def_default(void); /**< @thread any */
@@ -60,6 +61,36 @@ SONDE_API sonde_status sonde_fit_bulk(const sonde_model_def *def, const sonde_si
                                       const sonde_progress *progress, sonde_model **model,
                                       sonde_fit_bulk_result *result, double *predicted_n,
                                       sonde_error *error);
+
+/** The volumetric model of a definition with the kind's default moduli: the mesh alone.
+ * @return as sonde_fit_bulk() @thread owner */
+SONDE_API sonde_status sonde_bulk_model(const sonde_model_def *def,
+                                        const sonde_fit_bulk_def *options, sonde_model **model,
+                                        sonde_error *error);
+
+/** A linear solid condensed to the nodes of its skin (Bro-Nielsen and Cotin 1996): K* = K_ss - K_si
+ * K_ii^-1 K_is and its inverse, computed beforehand. */
+typedef struct sonde_condensed_cost {
+  uint32_t nodes, skin_nodes, contact_nodes;
+  double setup_s;           /**< wall time of condensing and inverting */
+  double bytes;             /**< of K* and its inverse */
+  double contact_s;         /**< forces that move the touched nodes, median */
+  double update_s;          /**< displacements of all nodes of the skin under them, median */
+  double force_n;           /**< on the footprint along the inward normal */
+  double solve_difference;  /**< of the forces from those of the whole solid's factor, relative */
+  double engine_difference; /**< of force_n from the engine's equilibrium of the same model,
+                               relative */
+} sonde_condensed_cost;
+
+/**
+ * What condensation costs for a footprint that is bonded to the skin at a site and moved in.
+ * @param model a linear solid of at most 2,500 nodes of the skin
+ * @return ARGUMENT for another kind or a larger skin; CONVERGENCE; MEMORY @thread owner
+ */
+SONDE_API sonde_status sonde_condensed_measure(const sonde_model *model, const sonde_site *site,
+                                               double half_u_m, double half_v_m, double depth_m,
+                                               uint32_t threads, sonde_condensed_cost *cost,
+                                               sonde_error *error);
 
 #ifdef __cplusplus
 }

@@ -25,7 +25,7 @@ static sonde_model *make_ball(sonde_model_kind kind, const sonde_bulk_law *law, 
   const sonde_bulk_law fallback = sonde_bulk_law_default(kind);
   sonde_model *model = NULL;
   sonde_error error = {0};
-  if (sonde_bulk_build(&def, &mesh, kind, law ? law : &fallback, &model, NULL, &error))
+  if (sonde_bulk_build(&def, &mesh, NULL, kind, law ? law : &fallback, &model, NULL, &error))
     fail_msg("%s", error.message);
   sonde_mesh_clear(&skin);
   sonde_mesh_clear(&bone);

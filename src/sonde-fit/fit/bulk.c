@@ -51,6 +51,8 @@ static uint32_t list_parameters(sonde_model_kind kind, sonde_bulk_law *law,
   return count;
 }
 
+enum { MOST_NEWTON = 60 }; // a lattice that folds needs more and is given up
+
 typedef struct search {
   sonde_model *model;
   const sonde_site_table *sites;
@@ -93,8 +95,9 @@ static sonde_status press_curve(void *user, uint32_t worker, uint32_t curve,
   while (plan->site_index[at] != plan->curve_site[curve]) ++at;
   const sonde_site *site = &s->sites->sites[plan->curve_site[curve]];
   sonde_bonded bonded;
-  sonde_status status = sonde_bonded_create_on(s->local[at], site, plan->half_u_m[probe],
-                                               plan->half_v_m[probe], 1e-4, 200, &bonded, error);
+  sonde_status status =
+      sonde_bonded_create_on(s->local[at], site, plan->half_u_m[probe], plan->half_v_m[probe], 1e-4,
+                             MOST_NEWTON, &bonded, error);
   if (status) return status;
   double force_n = 0;
   for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
@@ -273,6 +276,25 @@ static sonde_status seek(search *s, const sonde_progress *progress, sonde_fit_bu
   return status ? status : set_law(s, s->theta, s->model, error);
 }
 
+static sonde_status build(const sonde_model_def *def, const sonde_fit_bulk_def *options,
+                          sonde_model **model, double *worst_rad, sonde_error *error) {
+  sonde_bulk_law law = sonde_bulk_law_default(options->kind);
+  law.poisson = options->poisson;
+  const sonde_bulk_mesh mesh = {.edge_m = options->edge_m,
+                                .growth = options->growth,
+                                .fine_edge_m = options->fine_edge_m,
+                                .fine_reach_m = options->fine_reach_m};
+  sonde_status status = sonde_def_check("fit_bulk", options->version, error);
+  if (status) return status;
+  return sonde_bulk_build(def, &mesh, options->layers, options->kind, &law, model, worst_rad,
+                          error);
+}
+
+sonde_status sonde_bulk_model(const sonde_model_def *def, const sonde_fit_bulk_def *options,
+                              sonde_model **model, sonde_error *error) {
+  return build(def, options, model, NULL, error);
+}
+
 sonde_status sonde_fit_bulk(const sonde_model_def *def, const sonde_site_table *sites,
                             const sonde_measurements *measurements,
                             const sonde_fit_bulk_def *options, const sonde_progress *progress,
@@ -282,14 +304,7 @@ sonde_status sonde_fit_bulk(const sonde_model_def *def, const sonde_site_table *
   *result = (sonde_fit_bulk_result){0};
   sonde_model *model = NULL;
   double start = sonde_clock_now();
-  sonde_bulk_law law = sonde_bulk_law_default(options->kind);
-  law.poisson = options->poisson;
-  const sonde_bulk_mesh mesh = {.edge_m = options->edge_m,
-                                .growth = options->growth,
-                                .fine_edge_m = options->fine_edge_m,
-                                .fine_reach_m = options->fine_reach_m};
-  sonde_status status =
-      sonde_bulk_build(def, &mesh, options->kind, &law, &model, &result->worst_dihedral_rad, error);
+  sonde_status status = build(def, options, &model, &result->worst_dihedral_rad, error);
   if (!status) {
     result->node_count = model->bulk->node_count, result->skin_nodes = model->surface.vertex_count;
     result->element_count = model->bulk->element_count;
@@ -317,7 +332,7 @@ sonde_status sonde_fit_bulk(const sonde_model_def *def, const sonde_site_table *
     }
     double scale = square > 0 && product > 0 ? product / square : 1;
     for (uint32_t r = 0; r < measurements->count; ++r) predicted_n[r] *= scale;
-    law = model->bulk->law;
+    sonde_bulk_law law = model->bulk->law;
     law.skin_n_m *= scale, law.volume_pa *= scale;
     for (int k = 0; k < SONDE_LAYERS; ++k) law.spring_pa[k] *= scale, law.young_pa[k] *= scale;
     status = sonde_model_set_bulk_law(model, &law, error);

@@ -50,7 +50,7 @@ SONDE_LINK sonde_status sonde_fail_at(sonde_error *error, sonde_status status, c
 
 // Whether an option struct has the version of this library.
 // @return SONDE_ARGUMENT naming what was to be made
-sonde_status sonde_def_check(const char *what, uint32_t version, sonde_error *error);
+SONDE_LINK sonde_status sonde_def_check(const char *what, uint32_t version, sonde_error *error);
 
 SONDE_LINK void sonde_log(sonde_log_level level, const char *format, ...)
     __attribute__((format(printf, 2, 3)));

@@ -52,7 +52,7 @@ SONDE_LINK void sonde_elastic_destroy(sonde_elastic *elastic);
 SONDE_LINK sonde_status sonde_elastic_set(sonde_elastic *elastic, const double *young_pa,
                                           double poisson, double skin_n_m, sonde_error *error);
 // f[3 count] = K u. @thread any (read only)
-SONDE_LINK void sonde_elastic_multiply(const sonde_elastic *elastic, const double *u, double *f);
+void sonde_elastic_multiply(const sonde_elastic *elastic, const double *u, double *f);
 
 // Scratch of one thread.
 typedef struct sonde_elastic_scratch sonde_elastic_scratch;
@@ -70,14 +70,14 @@ SONDE_LINK sonde_status sonde_elastic_solve(const sonde_elastic *elastic,
                                             sonde_error *error);
 // Compliance [3 node_count][3 node_count] of some nodes without condensing: column by column.
 // Columns are shared among `workers` threads (0: one per core). Held nodes are an ARGUMENT error.
-SONDE_LINK sonde_status sonde_elastic_compliance(const sonde_elastic *elastic,
+sonde_status sonde_elastic_compliance(const sonde_elastic *elastic,
                                                  const uint32_t *nodes, uint32_t node_count,
                                                  uint32_t workers, double *compliance,
                                                  sonde_error *error);
 // Derivatives of u.K u with respect to the logarithm of Young's modulus of each group (of
 // group[tetrahedron] < group_count, with the skin last: group_count + 1 numbers). For imposed
 // displacements u.K u is the work of their forces, and its derivative this one.
-SONDE_LINK void sonde_elastic_sensitivity(const sonde_elastic *elastic, const double *u,
+void sonde_elastic_sensitivity(const sonde_elastic *elastic, const double *u,
                                           const uint32_t *group, uint32_t group_count,
                                           double *derivative);
 

@@ -8,7 +8,7 @@
 // inverse [n * n], both triangles, of a [n * n], of which the lower triangle is read; they differ.
 // The same bits for any number of workers (0: one per core).
 // @return CONVERGENCE: not positive definite @thread owner
-SONDE_LINK sonde_status sonde_invert(const double *a, uint32_t n, uint32_t workers, double *inverse,
+sonde_status sonde_invert(const double *a, uint32_t n, uint32_t workers, double *inverse,
                                      sonde_error *error);
 
 #endif

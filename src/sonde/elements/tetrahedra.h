@@ -36,10 +36,10 @@ typedef struct sonde_tetrahedra_def {
 // @return SONDE_ARGUMENT for bad lengths, or edges that ask for over 4 million cells; SONDE_MESH
 //   for a surface that is open, points inwards, crosses itself or is too thin for the edges
 // @thread owner
-SONDE_LINK sonde_status sonde_tetrahedralise(const sonde_mesh *outer, const sonde_mesh *inner,
+sonde_status sonde_tetrahedralise(const sonde_mesh *outer, const sonde_mesh *inner,
                                              const sonde_tetrahedra_def *def,
                                              sonde_tetrahedra *tetrahedra, sonde_error *error);
-SONDE_LINK void sonde_tetrahedra_clear(sonde_tetrahedra *tetrahedra); // NULL is ignored
+void sonde_tetrahedra_clear(sonde_tetrahedra *tetrahedra); // NULL is ignored
 
 // Measures of a mesh.
 typedef struct sonde_tetrahedra_report {
@@ -50,7 +50,7 @@ typedef struct sonde_tetrahedra_report {
 } sonde_tetrahedra_report;
 // @param outer,inner as in sonde_tetrahedralise(); outer NULL: off_surface_m is 0
 // @thread owner
-SONDE_LINK sonde_status sonde_tetrahedra_inspect(const sonde_tetrahedra *tetrahedra,
+sonde_status sonde_tetrahedra_inspect(const sonde_tetrahedra *tetrahedra,
                                                  const sonde_mesh *outer, const sonde_mesh *inner,
                                                  sonde_tetrahedra_report *report,
                                                  sonde_error *error);

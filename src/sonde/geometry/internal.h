@@ -129,7 +129,7 @@ SONDE_LINK void sonde_mesh_footprint(const sonde_mesh *mesh, sonde_vec3 centre, 
                                      sonde_vec3 u, sonde_vec3 v, double hu_m, double hv_m,
                                      double reach_m, double *covered_m2);
 // Distance from a closed surface, negative inside. @thread any (read only)
-SONDE_LINK double sonde_surface_signed_distance(const sonde_surface_index *index, sonde_vec3 query);
+double sonde_surface_signed_distance(const sonde_surface_index *index, sonde_vec3 query);
 // Refines where `target` asks for shorter edges, without hanging vertices. An edge is halved while
 // it is longer than 1.42 times the target at its middle: halving a shorter one would overshoot.
 // Longest edges go first, so that no angle falls below half the smallest given; slivers around a

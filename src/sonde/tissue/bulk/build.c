@@ -39,23 +39,6 @@ static sonde_status shorten_bone(const sonde_mesh *skin, double margin, sonde_me
   return SONDE_OK;
 }
 
-// Depths of the layers below the nodes of a skin, from those of another one nearby.
-static sonde_status take_depths(const sonde_model *from, sonde_model *to, sonde_error *error) {
-  sonde_surface_index *index = NULL;
-  sonde_status status = sonde_surface_index_create(&from->surface, &index, error);
-  for (uint32_t i = 0; !status && i < to->surface.vertex_count; ++i) {
-    sonde_surface_point at = sonde_surface_closest(index, to->surface.vertices[i]);
-    const uint32_t *v = from->surface.faces[at.face];
-    to->fat_depth_m[i] = to->muscle_depth_m[i] = 0;
-    for (int k = 0; k < 3; ++k) {
-      to->fat_depth_m[i] += at.weight[k] * from->fat_depth_m[v[k]];
-      to->muscle_depth_m[i] += at.weight[k] * from->muscle_depth_m[v[k]];
-    }
-  }
-  sonde_surface_index_destroy(index);
-  return status;
-}
-
 // depths: NULL, or a model that the layers' depths are taken from.
 static sonde_status build(const sonde_model_def *given, const sonde_tetrahedra_def *mesh,
                           const sonde_model *depths, sonde_model_kind kind,
@@ -64,13 +47,14 @@ static sonde_status build(const sonde_model_def *given, const sonde_tetrahedra_d
   sonde_tetrahedra solid = {0};
   sonde_tetrahedra_report quality = {0};
   sonde_mesh outer = {0}, inner = {0};
+  sonde_surface_index *index = NULL;
   sonde_model *model = NULL;
   *out = NULL;
   if (!given->femur || given->femur->face_count == 0)
     return sonde_fail(error, SONDE_ARGUMENT,
                       "a volumetric model needs a bone that holds it, and none was given");
   sonde_status status = sonde_mesh_copy(given->femur, &inner, error);
-  if (!status) status = shorten_bone(given->skin, 2 * mesh->edge_m, &inner, error);
+  if (!status) status = shorten_bone(given->skin, mesh->edge_m, &inner, error);
   if (!status) status = sonde_tetrahedralise(given->skin, &inner, mesh, &solid, error);
   if (!status) status = sonde_tetrahedra_inspect(&solid, NULL, NULL, &quality, error);
   if (!status)
@@ -83,7 +67,18 @@ static sonde_status build(const sonde_model_def *given, const sonde_tetrahedra_d
     def.fine_edge_m = 10, def.fine_reach_m = 0; // the skin's mesh stays as it is
     status = sonde_model_build(&def, &model, error);
   }
-  if (!status && depths) status = take_depths(depths, model, error);
+  // Depths of the layers from those of the other skin, which is near.
+  if (!status && depths) status = sonde_surface_index_create(&depths->surface, &index, error);
+  for (uint32_t i = 0; !status && depths && i < model->surface.vertex_count; ++i) {
+    sonde_surface_point at = sonde_surface_closest(index, model->surface.vertices[i]);
+    const uint32_t *v = depths->surface.faces[at.face];
+    model->fat_depth_m[i] = model->muscle_depth_m[i] = 0;
+    for (int k = 0; k < 3; ++k) {
+      model->fat_depth_m[i] += at.weight[k] * depths->fat_depth_m[v[k]];
+      model->muscle_depth_m[i] += at.weight[k] * depths->muscle_depth_m[v[k]];
+    }
+  }
+  sonde_surface_index_destroy(index);
   if (!status) status = sonde_model_fill(model, &solid, kind, law, error);
   if (worst_rad) *worst_rad = quality.smallest_dihedral_rad;
   sonde_tetrahedra_clear(&solid);
@@ -97,8 +92,9 @@ static sonde_status build(const sonde_model_def *given, const sonde_tetrahedra_d
 }
 
 sonde_status sonde_bulk_build(const sonde_model_def *def, const sonde_bulk_mesh *mesh,
-                              sonde_model_kind kind, const sonde_bulk_law *law, sonde_model **model,
-                              double *worst_rad, sonde_error *error) {
+                              const sonde_model *layers, sonde_model_kind kind,
+                              const sonde_bulk_law *law, sonde_model **model, double *worst_rad,
+                              sonde_error *error) {
   *model = NULL;
   sonde_vec3 *fine = SONDE_NEW(sonde_vec3, def->site_count);
   if (!fine) return sonde_fail_memory(error);
@@ -109,7 +105,7 @@ sonde_status sonde_bulk_build(const sonde_model_def *def, const sonde_bulk_mesh 
                                            .fine_count = def->site_count,
                                            .fine_edge_m = mesh->fine_edge_m,
                                            .fine_reach_m = mesh->fine_reach_m};
-  sonde_status status = build(def, &tetrahedra, NULL, kind, law, model, worst_rad, error);
+  sonde_status status = build(def, &tetrahedra, layers, kind, law, model, worst_rad, error);
   sonde_free(fine);
   return status;
 }

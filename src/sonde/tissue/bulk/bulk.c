@@ -213,23 +213,6 @@ static sonde_status rank_nodes(const sonde_model *model, const sonde_tetrahedra 
   return status;
 }
 
-// The layer of every element, from its depth below the skin.
-static sonde_status find_layers(const sonde_model *model, sonde_bulk *bulk, sonde_error *error) {
-  sonde_surface_index *index = NULL;
-  sonde_status status = sonde_surface_index_create(&model->surface, &index, error);
-  for (uint32_t e = 0; !status && e < bulk->element_count; ++e) {
-    sonde_vec3 middle = vec3(0, 0, 0);
-    for (int c = 0; c < 4; ++c) middle = v_madd(middle, 0.25, bulk->node[bulk->element[e][c]]);
-    sonde_surface_point hit = sonde_surface_closest(index, middle);
-    const uint32_t *v = model->surface.faces[hit.face];
-    double depth = v_distance(middle, hit.point_m), fat = 0;
-    for (int k = 0; k < 3; ++k) fat += model->muscle_depth_m[v[k]] / 3;
-    bulk->layer[e] = depth < fat ? SONDE_LAYER_FAT : SONDE_LAYER_MUSCLE;
-  }
-  sonde_surface_index_destroy(index);
-  return status;
-}
-
 sonde_status sonde_model_fill(sonde_model *model, const sonde_tetrahedra *solid,
                               sonde_model_kind kind, const sonde_bulk_law *law,
                               sonde_error *error) {
@@ -239,6 +222,7 @@ sonde_status sonde_model_fill(sonde_model *model, const sonde_tetrahedra *solid,
   if (solid->surface_count != skin)
     return sonde_fail(error, SONDE_MISMATCH, "the skin has %u nodes, the solid's boundary %u", skin,
                       solid->surface_count);
+  sonde_surface_index *index = NULL;
   sonde_bulk *bulk = SONDE_NEW(sonde_bulk, 1);
   uint32_t *rank = SONDE_NEW(uint32_t, n);
   if (!bulk || !rank) status = sonde_fail_memory(error);
@@ -256,8 +240,19 @@ sonde_status sonde_model_fill(sonde_model *model, const sonde_tetrahedra *solid,
     for (uint32_t i = 0; i < n; ++i) bulk->node[rank[i]] = solid->node[i];
     for (uint32_t e = 0; e < count; ++e)
       for (int c = 0; c < 4; ++c) bulk->element[e][c] = rank[solid->corner[e][c]];
-    status = find_layers(model, bulk, error);
+    status = sonde_surface_index_create(&model->surface, &index, error);
   }
+  // The layer of every element, from its depth below the skin.
+  for (uint32_t e = 0; !status && e < count; ++e) {
+    sonde_vec3 middle = vec3(0, 0, 0);
+    for (int c = 0; c < 4; ++c) middle = v_madd(middle, 0.25, bulk->node[bulk->element[e][c]]);
+    sonde_surface_point hit = sonde_surface_closest(index, middle);
+    const uint32_t *v = model->surface.faces[hit.face];
+    double fat = 0;
+    for (int k = 0; k < 3; ++k) fat += model->muscle_depth_m[v[k]] / 3;
+    bulk->layer[e] = hit.distance_m < fat ? SONDE_LAYER_FAT : SONDE_LAYER_MUSCLE;
+  }
+  sonde_surface_index_destroy(index);
   if (!status) status = sonde_bulk_derive(bulk, model, error);
   sonde_free(rank);
   if (status) {
@@ -309,23 +304,6 @@ static void add_element_springs(const sonde_model *model, uint32_t e, sonde_bulk
     }
 }
 
-// The skin as a membrane: an edge takes a part of the stiffness by the areas at its sides.
-static void add_skin_springs(const sonde_model *model, sonde_bulk_graph *graph) {
-  const sonde_bulk_law *law = &model->bulk->law;
-  for (uint32_t f = 0; f < model->surface.face_count; ++f)
-    for (int k = 0; k < 3; ++k) {
-      uint32_t i = model->surface.faces[f][k], j = model->surface.faces[f][(k + 1) % 3];
-      sonde_vec3 d = v_sub(model->bulk->node[j], model->bulk->node[i]);
-      double stiffness = law->stiffness_scale * law->skin_n_m * model->face_area_m2[f] / v_norm2(d);
-      for (int side = 0; side < 2; ++side) {
-        sonde_bulk_spring *spring =
-            &graph->spring[side == 0 ? slot_of(graph, i, j) : slot_of(graph, j, i)];
-        spring->stiffness_n_m += stiffness;
-        spring->steep_n_m += law->steepening * stiffness;
-      }
-    }
-}
-
 // K_ab = V (lambda g_a g_b^T + mu g_b g_a^T + mu g_a.g_b I) of a linear tetrahedron.
 static void add_solids(const sonde_model *model, sonde_bulk_graph *graph) {
   const sonde_bulk *bulk = model->bulk;
@@ -369,7 +347,21 @@ sonde_status sonde_bulk_graph_create(const sonde_model *model, sonde_bulk_graph 
   }
   if (!status && springs) {
     for (uint32_t e = 0; e < bulk->element_count; ++e) add_element_springs(model, e, graph);
-    if (model->kind == SONDE_THREE_LAYER) add_skin_springs(model, graph);
+    // The skin as a membrane: an edge takes a part of the stiffness by the areas at its sides.
+    const sonde_bulk_law *law = &bulk->law;
+    uint32_t faces = model->kind == SONDE_THREE_LAYER ? model->surface.face_count : 0;
+    for (uint32_t k = 0; k < 3 * faces; ++k) {
+      uint32_t f = k / 3, i = model->surface.faces[f][k % 3],
+               j = model->surface.faces[f][(k + 1) % 3];
+      double length2 = v_norm2(v_sub(bulk->node[j], bulk->node[i]));
+      double stiffness = law->stiffness_scale * law->skin_n_m * model->face_area_m2[f] / length2;
+      for (int side = 0; side < 2; ++side) {
+        sonde_bulk_spring *spring =
+            &graph->spring[side == 0 ? slot_of(graph, i, j) : slot_of(graph, j, i)];
+        spring->stiffness_n_m += stiffness;
+        spring->steep_n_m += law->steepening * stiffness;
+      }
+    }
     for (uint32_t i = 0; i < n; ++i)
       for (uint32_t k = graph->start[i]; k < graph->start[i + 1]; ++k) {
         sonde_vec3 d = v_sub(bulk->node[graph->neighbour[k]], bulk->node[i]);

@@ -24,13 +24,14 @@ typedef struct sonde_bulk_mesh {
 
 // Fills the space between the definition's skin and bone with tetrahedra and makes a volumetric
 // model on their boundary. A bone that reaches the skin's cut ends is shortened along itself.
+// @param layers whose depths of fat and muscle count; NULL: those of the definition's interfaces
 // @param[out] worst_rad smallest dihedral angle; may be NULL
 // @return ARGUMENT without a bone or for a law out of range; MESH
 // @thread owner
 SONDE_LINK sonde_status sonde_bulk_build(const sonde_model_def *def, const sonde_bulk_mesh *mesh,
-                                         sonde_model_kind kind, const sonde_bulk_law *law,
-                                         sonde_model **model, double *worst_rad,
-                                         sonde_error *error);
+                                         const sonde_model *layers, sonde_model_kind kind,
+                                         const sonde_bulk_law *law, sonde_model **model,
+                                         double *worst_rad, sonde_error *error);
 // The same body and law with a mesh that is fine (2 mm) at a place of its skin, coarse elsewhere.
 // @param[out] local owned by the caller @thread owner
 SONDE_LINK sonde_status sonde_bulk_refine_at(const sonde_model *model, sonde_vec3 place_m,
