@@ -26,10 +26,9 @@ SONDE_LINK sonde_status sonde_condensed_create(const sonde_elastic *elastic, uin
                                                sonde_condensed **condensed,
                                                sonde_condensed_times *times, sonde_error *error);
 // The compliance of any few nodes, column by column, without the stiffness. @thread owner
-sonde_status sonde_condensed_of_nodes(const sonde_elastic *elastic,
-                                                 const uint32_t *nodes, uint32_t count,
-                                                 uint32_t workers, sonde_condensed **condensed,
-                                                 sonde_error *error);
+sonde_status sonde_condensed_of_nodes(const sonde_elastic *elastic, const uint32_t *nodes,
+                                      uint32_t count, uint32_t workers, sonde_condensed **condensed,
+                                      sonde_error *error);
 SONDE_LINK void sonde_condensed_destroy(sonde_condensed *condensed);
 
 // Forces f[3 count] that move some nodes (by their place in the list) by u[3 count], all others
@@ -51,9 +50,8 @@ typedef struct sonde_plate {
 
 // force_n[depth_count] of the plate along `inward` at each depth; node_force [depth_count][count],
 // along `inward`, may be NULL. @return as sonde_condensed_forces() @thread any (read only)
-sonde_status sonde_condensed_press(const sonde_condensed *condensed,
-                                              const sonde_plate *plate, const double *depth_m,
-                                              uint32_t depth_count, double *force_n,
-                                              double *node_force, sonde_error *error);
+sonde_status sonde_condensed_press(const sonde_condensed *condensed, const sonde_plate *plate,
+                                   const double *depth_m, uint32_t depth_count, double *force_n,
+                                   double *node_force, sonde_error *error);
 
 #endif

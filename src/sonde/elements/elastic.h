@@ -70,15 +70,13 @@ SONDE_LINK sonde_status sonde_elastic_solve(const sonde_elastic *elastic,
                                             sonde_error *error);
 // Compliance [3 node_count][3 node_count] of some nodes without condensing: column by column.
 // Columns are shared among `workers` threads (0: one per core). Held nodes are an ARGUMENT error.
-sonde_status sonde_elastic_compliance(const sonde_elastic *elastic,
-                                                 const uint32_t *nodes, uint32_t node_count,
-                                                 uint32_t workers, double *compliance,
-                                                 sonde_error *error);
+sonde_status sonde_elastic_compliance(const sonde_elastic *elastic, const uint32_t *nodes,
+                                      uint32_t node_count, uint32_t workers, double *compliance,
+                                      sonde_error *error);
 // Derivatives of u.K u with respect to the logarithm of Young's modulus of each group (of
 // group[tetrahedron] < group_count, with the skin last: group_count + 1 numbers). For imposed
 // displacements u.K u is the work of their forces, and its derivative this one.
-void sonde_elastic_sensitivity(const sonde_elastic *elastic, const double *u,
-                                          const uint32_t *group, uint32_t group_count,
-                                          double *derivative);
+void sonde_elastic_sensitivity(const sonde_elastic *elastic, const double *u, const uint32_t *group,
+                               uint32_t group_count, double *derivative);
 
 #endif

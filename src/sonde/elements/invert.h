@@ -9,6 +9,6 @@
 // The same bits for any number of workers (0: one per core).
 // @return CONVERGENCE: not positive definite @thread owner
 sonde_status sonde_invert(const double *a, uint32_t n, uint32_t workers, double *inverse,
-                                     sonde_error *error);
+                          sonde_error *error);
 
 #endif

@@ -26,10 +26,9 @@ typedef struct sonde_moduli_result {
 // on their logarithms. The solid ends with the result. Footprints are shared among `workers`
 // threads.
 // @return ARGUMENT; CONVERGENCE: of a solve @thread owner
-sonde_status sonde_moduli_fit(sonde_elastic *elastic, double poisson,
-                                         const uint32_t *group, uint32_t group_count,
-                                         const sonde_bonded_footprint *footprints, uint32_t count,
-                                         uint32_t workers, double *young_pa, double *skin_n_m,
-                                         sonde_moduli_result *result, sonde_error *error);
+sonde_status sonde_moduli_fit(sonde_elastic *elastic, double poisson, const uint32_t *group,
+                              uint32_t group_count, const sonde_bonded_footprint *footprints,
+                              uint32_t count, uint32_t workers, double *young_pa, double *skin_n_m,
+                              sonde_moduli_result *result, sonde_error *error);
 
 #endif

@@ -37,8 +37,8 @@ typedef struct sonde_tetrahedra_def {
 //   for a surface that is open, points inwards, crosses itself or is too thin for the edges
 // @thread owner
 sonde_status sonde_tetrahedralise(const sonde_mesh *outer, const sonde_mesh *inner,
-                                             const sonde_tetrahedra_def *def,
-                                             sonde_tetrahedra *tetrahedra, sonde_error *error);
+                                  const sonde_tetrahedra_def *def, sonde_tetrahedra *tetrahedra,
+                                  sonde_error *error);
 void sonde_tetrahedra_clear(sonde_tetrahedra *tetrahedra); // NULL is ignored
 
 // Measures of a mesh.
@@ -50,9 +50,8 @@ typedef struct sonde_tetrahedra_report {
 } sonde_tetrahedra_report;
 // @param outer,inner as in sonde_tetrahedralise(); outer NULL: off_surface_m is 0
 // @thread owner
-sonde_status sonde_tetrahedra_inspect(const sonde_tetrahedra *tetrahedra,
-                                                 const sonde_mesh *outer, const sonde_mesh *inner,
-                                                 sonde_tetrahedra_report *report,
-                                                 sonde_error *error);
+sonde_status sonde_tetrahedra_inspect(const sonde_tetrahedra *tetrahedra, const sonde_mesh *outer,
+                                      const sonde_mesh *inner, sonde_tetrahedra_report *report,
+                                      sonde_error *error);
 
 #endif

@@ -36,16 +36,13 @@ typedef struct sonde_elastic_volume {
 
 // @return ARGUMENT @thread owner
 sonde_status sonde_elastic_volume_create(const sonde_elastic_volume_def *def,
-                                                    sonde_elastic_volume **volume,
-                                                    sonde_error *error);
+                                         sonde_elastic_volume **volume, sonde_error *error);
 void sonde_elastic_volume_destroy(sonde_elastic_volume *volume);
 // Forces f[3 nodes] that hold the nodes at the displacements u[3 nodes]; returns the energy, J.
 // @thread owner; no allocation, here and below
-double sonde_elastic_volume_forces(sonde_elastic_volume *volume, const double *u,
-                                              double *f);
+double sonde_elastic_volume_forces(sonde_elastic_volume *volume, const double *u, double *f);
 // Their change df under a change d of the displacements, at the u of the last forces.
-void sonde_elastic_volume_tangent(sonde_elastic_volume *volume, const double *d,
-                                             double *df);
+void sonde_elastic_volume_tangent(sonde_elastic_volume *volume, const double *d, double *df);
 
 typedef struct sonde_elastic_volume_result {
   uint32_t newton, cg; // iterations
@@ -53,10 +50,8 @@ typedef struct sonde_elastic_volume_result {
 } sonde_elastic_volume_result;
 // Equilibrium u[3 nodes], from u as it is, where the listed nodes keep their place in u. f receives
 // the forces. @return CONVERGENCE; result is filled then, too
-sonde_status sonde_elastic_volume_settle(sonde_elastic_volume *volume,
-                                                    const uint32_t *imposed, uint32_t imposed_count,
-                                                    double *u, double *f,
-                                                    sonde_elastic_volume_result *result,
-                                                    sonde_error *error);
+sonde_status sonde_elastic_volume_settle(sonde_elastic_volume *volume, const uint32_t *imposed,
+                                         uint32_t imposed_count, double *u, double *f,
+                                         sonde_elastic_volume_result *result, sonde_error *error);
 
 #endif
