@@ -88,6 +88,8 @@ __attribute__((format(printf, 3, 4))) void paper_say(paper_claim *claim, paper_v
 paper_table *paper_table_begin(paper *p, const char *id, const char *title, const char *columns);
 // A row with as many numbers as the table has columns.
 void paper_row(paper_table *table, const char *key, const char *name, const double *cells);
+// Cell of a row and a column by their keys; NaN when there is none.
+double paper_cell(const paper_table *table, const char *row, const char *column);
 __attribute__((format(printf, 3, 4))) void paper_caption(char *caption, size_t room,
                                                          const char *format, ...);
 // Begins figure `number` as SVG in the directory; paper_figure_end() writes it.
@@ -106,10 +108,13 @@ void paper_path(const paper *p, const char *name, char *path, size_t room);
 
 // ---- work, each part in a file of its own; each adds claims, tables and figures
 
-sonde_status paper_curves(paper *p, sonde_error *error);    // figures 4 and 5
-sonde_status paper_fit(paper *p, sonde_error *error);       // figure 7
-sonde_status paper_models(paper *p, sonde_error *error);    // the table `models`
-sonde_status paper_bulk(paper *p, sonde_error *error);      // the table `volumetric`
+sonde_status paper_curves(paper *p, sonde_error *error); // figures 4 and 5
+sonde_status paper_fit(paper *p, sonde_error *error);    // figure 7
+sonde_status paper_models(paper *p, sonde_error *error); // the table `models`
+sonde_status paper_bulk(paper *p, sonde_error *error);   // the table `volumetric`
+// Processor time of a state's creation and of a step of 1 ms while the flat probe goes in, ms.
+sonde_status paper_time_steps(const paper *p, const sonde_model *model, double *setup_ms,
+                              double *step_ms, sonde_error *error);
 sonde_status paper_drawings(paper *p, sonde_error *error);  // figures 3 and 6
 sonde_status paper_pressed(paper *p, sonde_error *error);   // figure 8
 sonde_status paper_sweep(paper *p, sonde_error *error);     // figures 1 and 2

@@ -72,8 +72,8 @@ static double percent_at(const sonde_measurements *m, const double *model_n, con
 }
 
 // Processor time of a state's creation and of a step of 1 ms while the flat probe goes in, ms.
-static sonde_status time_steps(const paper *p, const sonde_model *model, double *setup_ms,
-                               double *step_ms, sonde_error *error) {
+sonde_status paper_time_steps(const paper *p, const sonde_model *model, double *setup_ms,
+                              double *step_ms, sonde_error *error) {
   enum { MOST_STEPS = 200 };
   uint32_t steps = p->quick ? 20u : MOST_STEPS;
   double taken[MOST_STEPS];
@@ -128,7 +128,7 @@ static sonde_status measure_kind(const paper *p, sonde_model_kind kind, const ch
     status = sonde_fit_bulk(&def, &p->sites, &j->sought.m, &options, NULL, model, &r, n[0], error);
   if (!status) status = predict(p, *model, &j->left_out, n[1], error);
   if (!status) status = predict(p, *model, &j->third, n[2], error);
-  if (!status) status = time_steps(p, *model, &setup_ms, &step_ms, error);
+  if (!status) status = paper_time_steps(p, *model, &setup_ms, &step_ms, error);
   if (!status) {
     double none = 0;
     for (uint32_t i = 0; i < j->left_out.m.count; ++i)
@@ -160,7 +160,7 @@ static sonde_status add_two_layer(const paper *p, const judged *j, int stage, co
   double setup_ms = NAN, step_ms = NAN;
   sonde_status status = n[0] && n[1] ? SONDE_OK : (error->status = SONDE_MEMORY);
   assert(all != NULL);
-  if (!status && stage == 2) status = time_steps(p, p->model, &setup_ms, &step_ms, error);
+  if (!status && stage == 2) status = paper_time_steps(p, p->model, &setup_ms, &step_ms, error);
   if (!status) {
     for (uint32_t i = 0; i < j->sought.m.count; ++i) n[0][i] = all[j->sought.at[i]];
     for (uint32_t i = 0; i < j->left_out.m.count; ++i)
@@ -183,21 +183,13 @@ static sonde_status add_two_layer(const paper *p, const judged *j, int stage, co
   return status;
 }
 
-static double cell_of(const paper_table *t, const char *row, const char *column) {
-  for (uint32_t r = 0; r < t->row_count; ++r)
-    for (uint32_t k = 0; k < t->column_count && strcmp(t->row[r].key, row) == 0; ++k)
-      if (strncmp(t->column[k], column, strlen(column)) == 0 && t->column[k][strlen(column)] == '|')
-        return t->row[r].cell[k];
-  return NAN;
-}
-
 static void judge(paper *p, const paper_table *t, const sonde_condensed_cost *cost,
                   uint32_t samples) {
-  double linear = cell_of(t, "linear", "both_percent"),
-         bent = cell_of(t, "neo_hookean", "both_percent"),
-         paper_error = cell_of(t, "two_layer_paper", "both_percent"),
-         own = cell_of(t, "two_layer_shear", "both_percent");
-  paper_claim *c = paper_begin(p, "linear_inconvenient", "2",
+  double linear = paper_cell(t, "linear", "both_percent"),
+         bent = paper_cell(t, "neo_hookean", "both_percent"),
+         paper_error = paper_cell(t, "two_layer_paper", "both_percent"),
+         own = paper_cell(t, "two_layer_shear", "both_percent");
+  paper_claim *c = paper_begin(p, "linear_solid_inconvenient", "2",
                                "Linear elasticity is inconvenient where deformations are large and "
                                "tissue is incompressible.",
                                "Linear and neo-Hookean tetrahedra with one modulus for fat and one "
@@ -215,11 +207,12 @@ static void judge(paper *p, const paper_table *t, const sonde_condensed_cost *co
             "%.1f %%, with numbers for every site.",
             linear, also, paper_error, own);
 
-  double step = cell_of(t, "two_layer_shear", "step_ms"), solid = cell_of(t, "linear", "step_ms"),
-         nodes = cell_of(t, "two_layer_shear", "nodes"),
-         solid_nodes = cell_of(t, "linear", "nodes");
+  double step = paper_cell(t, "two_layer_shear", "step_ms"),
+         solid = paper_cell(t, "linear", "step_ms"),
+         nodes = paper_cell(t, "two_layer_shear", "nodes"),
+         solid_nodes = paper_cell(t, "linear", "nodes");
   c = paper_begin(
-      p, "finite_elements_slower", "2",
+      p, "elements_slower", "2",
       "Finite elements are slower than masses and springs; condensed to the surface they "
       "become fast, for linear materials.",
       "A step of 1 ms of each model in the same engine, and a contact of the condensed "
@@ -227,7 +220,7 @@ static void judge(paper *p, const paper_table *t, const sonde_condensed_cost *co
   paper_samples(c, 200, "steps");
   paper_value(c, "two_layer_step_ms", step);
   paper_value(c, "linear_solid_step_ms", solid);
-  paper_value(c, "neo_hookean_step_ms", cell_of(t, "neo_hookean", "step_ms"));
+  paper_value(c, "neo_hookean_step_ms", paper_cell(t, "neo_hookean", "step_ms"));
   paper_value(c, "condensed_skin_nodes", cost->skin_nodes);
   paper_value(c, "condensed_setup_s", cost->setup_s);
   paper_value(c, "condensed_megabytes", cost->bytes / 1e6);

@@ -244,36 +244,6 @@ static const candidate CANDIDATES[] = {
      .exponent = 2}};
 enum { CANDIDATE_COUNT = sizeof CANDIDATES / sizeof *CANDIDATES };
 
-// ---- time
-
-// Processor time of creating a state and of a step while the flat probe is pressed in, ms.
-static sonde_status time_steps(const paper *p, const outcome *out, double *setup_ms,
-                               double *step_ms, sonde_error *error) {
-  enum { MOST_STEPS = 300 };
-  uint32_t steps = p->quick ? 30 : MOST_STEPS;
-  double taken[MOST_STEPS];
-  sonde_model *model = NULL;
-  sonde_state *state = NULL;
-  sonde_probe probe = {0};
-  sonde_world_def world = sonde_session_def_default().world;
-  sonde_status status = remake(p, &out->law, out->sites, &model, error);
-  if (!status) status = sonde_probe_create("linear", &probe, error);
-  double start = app_seconds(CLOCK_THREAD_CPUTIME_ID);
-  if (!status) status = sonde_state_create(model, &world, &state, error);
-  *setup_ms = 1e3 * (app_seconds(CLOCK_THREAD_CPUTIME_ID) - start);
-  for (uint32_t k = 0; k < steps && !status; ++k) {
-    double depth_m = 0.012 * (k + 1) / steps;
-    start = app_seconds(CLOCK_THREAD_CPUTIME_ID);
-    sonde_step(state, &probe, sonde_site_pose(p->central, depth_m));
-    taken[k] = 1e3 * (app_seconds(CLOCK_THREAD_CPUTIME_ID) - start);
-  }
-  if (!status) *step_ms = app_quantile(taken, steps, 0.5);
-  sonde_state_destroy(state);
-  sonde_probe_clear(&probe);
-  sonde_model_destroy(model);
-  return status;
-}
-
 // ---- table and claims
 
 // MAE over the mean force in per cent, per probe or pooled; NaN when a model has no force.
@@ -307,7 +277,10 @@ static sonde_status measure_candidate(paper *p, const candidate *m, paper_table 
     status = sonde_error_report_of(p->third.data, out.third_n, p->third.count, &third, error);
   if (!status)
     status = sonde_error_report_of(p->measurements.data, out.left_out_n, rows, &left_out, error);
-  if (!status) status = time_steps(p, &out, &setup_ms, &step_ms, error);
+  sonde_model *model = NULL;
+  if (!status) status = remake(p, &out.law, out.sites, &model, error);
+  if (!status) status = paper_time_steps(p, model, &setup_ms, &step_ms, error);
+  sonde_model_destroy(model);
   if (!status) {
     const double cells[] = {out.parameters,
                             seen.all.mae_n,
@@ -330,20 +303,11 @@ static sonde_status measure_candidate(paper *p, const candidate *m, paper_table 
   return status;
 }
 
-// Cell of a row and a column; NaN when there is none.
-static double cell_of(const paper_table *t, const char *row, const char *column) {
-  for (uint32_t r = 0; r < t->row_count; ++r)
-    for (uint32_t k = 0; k < t->column_count && strcmp(t->row[r].key, row) == 0; ++k)
-      if (strncmp(t->column[k], column, strlen(column)) == 0 && t->column[k][strlen(column)] == '|')
-        return t->row[r].cell[k];
-  return NAN;
-}
-
 static void judge_third(paper *p, const paper_table *t) {
-  double seen = cell_of(t, "two_layer_shear", "both_percent"),
-         third = cell_of(t, "two_layer_shear", "third_percent"),
-         paper_seen = cell_of(t, "two_layer_paper", "both_percent"),
-         paper_third = cell_of(t, "two_layer_paper", "third_percent");
+  double seen = paper_cell(t, "two_layer_shear", "both_percent"),
+         third = paper_cell(t, "two_layer_shear", "third_percent"),
+         paper_seen = paper_cell(t, "two_layer_paper", "both_percent"),
+         paper_third = paper_cell(t, "two_layer_paper", "third_percent");
   paper_claim *c = paper_begin(
       p, "two_probes_predict", "3.1",
       "From the two data sets a model can be made that responds correctly also to probes of "
@@ -366,29 +330,6 @@ static void judge_third(paper *p, const paper_table *t) {
             "the %.2f %% on the fitted two (wanted: 1.5 times), within the paper's 5 %%. The "
             "paper's own model: %.1f %%, against %.1f %% on the fitted two.",
             third, third / seen, seen, paper_third, paper_seen);
-}
-
-// Time of a step of the fastest finite elements of the table, if it has any, against springs.
-static void judge_elements(paper *p, const paper_table *t) {
-  double springs_ms = cell_of(t, "two_layer_paper", "step_ms"), elements_ms = INFINITY;
-  for (uint32_t r = 0; r < t->row_count; ++r)
-    if (strstr(t->row[r].key, "elements"))
-      elements_ms = fmin(elements_ms, cell_of(t, t->row[r].key, "step_ms"));
-  paper_claim *c = paper_begin(p, "elements_slower", "2",
-                               "Inter-connected springs are faster than finite elements, though "
-                               "matrices computed beforehand "
-                               "have sped these up.",
-                               "Time of a step of the models of the table, at equal nodes.");
-  paper_samples(c, t->row_count, "models");
-  paper_value(c, "springs_ms", springs_ms);
-  paper_value(c, "elements_ms", elements_ms);
-  if (!isfinite(elements_ms))
-    paper_say(c, PAPER_OPEN,
-              "The table has no finite elements yet; a step of springs takes %.3f ms.", springs_ms);
-  else
-    paper_say(c, springs_ms < elements_ms ? PAPER_HOLDS : PAPER_FAILS,
-              "A step of springs takes %.3f ms, of the fastest finite elements %.3f ms.",
-              springs_ms, elements_ms);
 }
 
 static sonde_status judge_one_probe(paper *p, sonde_error *error) {
@@ -443,6 +384,5 @@ sonde_status paper_models(paper *p, sonde_error *error) {
       status = measure_candidate(p, &CANDIDATES[k], t, error);
   if (status) return status;
   judge_third(p, t);
-  judge_elements(p, t);
   return judge_one_probe(p, error);
 }

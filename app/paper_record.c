@@ -71,6 +71,14 @@ paper_table *paper_table_begin(paper *p, const char *id, const char *title, cons
   return table;
 }
 
+double paper_cell(const paper_table *t, const char *row, const char *column) {
+  for (uint32_t r = 0; r < t->row_count; ++r)
+    for (uint32_t k = 0; k < t->column_count && strcmp(t->row[r].key, row) == 0; ++k)
+      if (strncmp(t->column[k], column, strlen(column)) == 0 && t->column[k][strlen(column)] == '|')
+        return t->row[r].cell[k];
+  return NAN;
+}
+
 void paper_row(paper_table *table, const char *key, const char *name, const double *cells) {
   assert(table->row_count < PAPER_ROWS);
   uint32_t r = table->row_count++;

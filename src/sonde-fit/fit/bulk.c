@@ -240,6 +240,9 @@ static sonde_status seek(search *s, const sonde_progress *progress, sonde_fit_bu
   sonde_bulk_law law = s->model->bulk->law;
   double *value[SONDE_BULK_PARAMETERS];
   s->count = list_parameters(s->model->kind, &law, result->parameter, value);
+  // A single modulus is found by the scale of all measurements.
+  result->converged = s->count == 1;
+  if (result->converged) return SONDE_OK;
   for (uint32_t k = 0; k < s->count; ++k) s->theta[k] = log(*value[k]);
   sonde_status status = sonde_fit_plan_create_all(s->sites, &s->rows, &s->plan, error);
   if (status) return status;
@@ -318,7 +321,7 @@ sonde_status sonde_fit_bulk(const sonde_model_def *def, const sonde_site_table *
   // Forces are proportional to all moduli together: one scale by all measurements.
   sonde_predict_def predict_def = sonde_predict_def_default();
   predict_def.interaction = SONDE_INTERACTION_FULL;
-  predict_def.relative_residual = 1e-4;
+  predict_def.relative_residual = 1e-4, predict_def.max_iterations = MOST_NEWTON;
   predict_def.threads = options->threads;
   if (!status)
     status = sonde_predict(model, sites, measurements, &predict_def, progress, predicted_n, error);
