@@ -115,8 +115,8 @@ static sonde_status measure_kind(const paper *p, sonde_model_kind kind, const ch
   def.law = p->model->law;
   sonde_fit_bulk_def options = sonde_fit_bulk_def_default();
   options.kind = kind, options.layers = p->model;
-  options.sites = p->quick ? 1 : 4, options.depths = 2;
-  options.max_steps = p->quick ? 1 : 5;
+  options.sites = p->quick ? 1 : 3, options.depths = 2;
+  options.max_steps = p->quick ? 1 : 4;
   if (p->quick) options.fine_edge_m = options.edge_m;
   double *n[3] = {malloc(j->sought.m.count * sizeof(double)),
                   malloc(j->left_out.m.count * sizeof(double)),
@@ -280,7 +280,7 @@ sonde_status paper_bulk(paper *p, sonde_error *error) {
       t->caption, sizeof t->caption,
       "Errors are mean absolute errors, in %% of the mean force, on the same rows for all: "
       "%u of fitted sites (linear, point, both), %u of sites left out, %u of the third "
-      "footprint. Volumetric models have one set of moduli for the whole thigh, sought on "
+      "footprint. Volumetric models have one set of moduli for the whole thigh, sought on three of "
       "these sites; the two-layer models have numbers for every site, fitted to all of "
       "them. No equilibrium: rows of sites left out that have no force. Step: median "
       "processor time with the flat probe going in.",

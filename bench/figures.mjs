@@ -98,7 +98,7 @@ const GROUPS = {
   },
   paper: {
     sources: ['src/sonde-fit', 'src/sonde-scene', 'src/sonde-sweep', 'src/sonde/geometry', 'src/sonde/echo', 'src/sonde/interior', ...engine,
-      ...['collision', 'curves', 'fit', 'models', 'pressed', 'solvers', 'speed', 'steps', 'sweep'].map(name => `app/paper_${name}.c`), 'data/thigh'],
+      ...['bulk', 'collision', 'curves', 'fit', 'models', 'pressed', 'solvers', 'speed', 'steps', 'sweep'].map(name => `app/paper_${name}.c`), 'data/thigh'],
     measure(bin) {
       const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-'))
       const started = Date.now(), values = json(bin, 'paper', '-o', folder)
@@ -218,6 +218,10 @@ const BLOCKS = {
   paper_models: ({ paper }) => table(['model', 'parameters', 'MAE / SD', 'linear', 'point', 'both', 'third footprint', 'sites left out', 'step'],
     Object.values(paper.tables.models.rows).map(r => [r.name, r.parameters, `${fixed(r.mae_n, 2)} / ${fixed(r.sd_n, 2)} N`,
       ...['linear', 'point', 'both', 'third', 'left_out'].map(key => `${fixed(r[`${key}_percent`], 2)} %`), `${fixed(r.step_ms, 2)} ms`])),
+  paper_volumetric: ({ paper }) => table(['model', 'parameters', 'linear', 'point', 'both', 'sites left out', 'third footprint', 'rows without equilibrium', 'nodes', 'set-up', 'step'],
+    Object.values(paper.tables.volumetric.rows).map(r => [r.name, r.parameters,
+      ...['linear', 'point', 'both', 'left_out', 'third'].map(key => r[`${key}_percent`] === null ? '' : `${fixed(r[`${key}_percent`], 1)} %`),
+      `${fixed(r.none_percent, 0)} %`, r.nodes, r.setup_ms === null ? '' : `${fixed(r.setup_ms, 0)} ms`, r.step_ms === null ? '' : `${fixed(r.step_ms, 2)} ms`])),
   paper_figures: ({ paper }) => table(['figure', 'what it shows'], Object.values(paper.figures).map(f => [f.title.replace(/\..*/, ''), f.caption])),
   solver: ({ solver }) => fenced(solver.output),
   accuracy: ({ accuracy }) => fenced(accuracy.output),

@@ -37,9 +37,7 @@ static uint32_t list_parameters(sonde_model_kind kind, sonde_bulk_law *law,
               {SONDE_THREE_LAYER, "spring_fat_pa", &law->spring_pa[SONDE_LAYER_FAT]},
               {SONDE_THREE_LAYER, "spring_muscle_pa", &law->spring_pa[SONDE_LAYER_MUSCLE]},
               {SONDE_THREE_LAYER, "volume_pa", &law->volume_pa},
-              {SONDE_THREE_LAYER, "skin_n_m", &law->skin_n_m},
               {SONDE_THREE_LAYER, "steepening", &law->steepening},
-              {SONDE_THREE_LAYER, "knee", &law->knee},
               {SONDE_LINEAR_SOLID, "young_fat_pa", &law->young_pa[SONDE_LAYER_FAT]},
               {SONDE_LINEAR_SOLID, "young_muscle_pa", &law->young_pa[SONDE_LAYER_MUSCLE]},
               {SONDE_NEO_HOOKEAN_SOLID, "young_fat_pa", &law->young_pa[SONDE_LAYER_FAT]},
@@ -51,7 +49,8 @@ static uint32_t list_parameters(sonde_model_kind kind, sonde_bulk_law *law,
   return count;
 }
 
-enum { MOST_NEWTON = 60 }; // a lattice that folds needs more and is given up
+// A body that folds needs more and is given up: while moduli are sought, and in a prediction.
+enum { MOST_SOUGHT = 25, MOST_NEWTON = 60 };
 
 typedef struct search {
   sonde_model *model;
@@ -97,7 +96,7 @@ static sonde_status press_curve(void *user, uint32_t worker, uint32_t curve,
   sonde_bonded bonded;
   sonde_status status =
       sonde_bonded_create_on(s->local[at], site, plan->half_u_m[probe], plan->half_v_m[probe], 1e-4,
-                             MOST_NEWTON, &bonded, error);
+                             MOST_SOUGHT, &bonded, error);
   if (status) return status;
   double force_n = 0;
   for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {

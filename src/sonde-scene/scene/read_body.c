@@ -195,6 +195,9 @@ static void read_two_layer(const sonde_scene_source *source, sonde_place at, son
   sonde_source_path(source, name, path, sizeof path);
   sonde_error error = {0};
   sonde_status status = sonde_model_load(bundled ? source->thigh : path, &body->model, &error);
+  if (!status && body->model->bulk)
+    status = sonde_fail(&error, SONDE_ARGUMENT,
+                        "%.300s: a volumetric model, expected a two-layer one", path);
   if (!status) status = sonde_mesh_copy(&body->model->surface, &body->surface, &error);
   uint32_t nodes = body->surface.vertex_count;
   if (!status) {
