@@ -39,7 +39,7 @@ static void put_rounded(sonde_json_out *out, const char *key, double value, doub
 }
 
 static void put_reals(sonde_json_out *out, const char *key, const double *list, int count) {
-  assert(count > 0);
+  assert(count >= 0);
   sonde_json_begin_list(out, key);
   for (int i = 0; i < count; ++i) sonde_json_put_real(out, NULL, list[i], 0);
   sonde_json_end(out);

@@ -20,7 +20,7 @@ check(rows.length === claims.length && claims.length >= 20, `${rows.length} rows
 claims.forEach((c, i) => check([c.sentence, c.done, c.found, c.verdict].every((words) => rows[i]?.includes(words)), `row ${i} is not of ${c.sentence}`));
 check(data.holds + data.in_part + data.does_not_hold + data.not_tried === claims.length, "verdicts add up to the claims");
 const tables = Object.values(data.tables);
-check((await page.$$("#tables table")).length === tables.length && tables.length >= 6, `${tables.length} tables`);
+check((await page.$$("#paper-tables table")).length === tables.length && tables.length >= 6, `${tables.length} tables`);
 for (const t of tables) for (const row of Object.values(t.rows)) check(text.includes(row.name), `no row ${row.name}`);
 check(text.includes("synthetic"), "the report says that its data are synthetic");
 await browser.close();

@@ -69,7 +69,7 @@ static sonde_status set_law(const search *s, const double *theta, sonde_model *m
                             sonde_error *error) {
   sonde_bulk_law law = model->bulk->law;
   const char *name[SONDE_BULK_PARAMETERS];
-  double *value[SONDE_BULK_PARAMETERS];
+  double *value[SONDE_BULK_PARAMETERS] = {NULL};
   list_parameters(model->kind, &law, name, value);
   for (uint32_t k = 0; k < s->count; ++k) *value[k] = exp(theta[k]);
   if (law.steepening < 1) law.steepening = 1;
@@ -237,7 +237,7 @@ static sonde_status choose_rows(const sonde_site_table *sites, const sonde_measu
 static sonde_status seek(search *s, const sonde_progress *progress, sonde_fit_bulk_result *result,
                          sonde_error *error) {
   sonde_bulk_law law = s->model->bulk->law;
-  double *value[SONDE_BULK_PARAMETERS];
+  double *value[SONDE_BULK_PARAMETERS] = {NULL};
   s->count = list_parameters(s->model->kind, &law, result->parameter, value);
   // A single modulus is found by the scale of all measurements.
   result->converged = s->count == 1;
@@ -326,7 +326,7 @@ sonde_status sonde_fit_bulk(const sonde_model_def *def, const sonde_site_table *
     status = sonde_predict(model, sites, measurements, &predict_def, progress, predicted_n, error);
   result->predict_s = sonde_clock_now() - start;
   if (!status) {
-    double product = 0, square = 0, *value[SONDE_BULK_PARAMETERS];
+    double product = 0, square = 0, *value[SONDE_BULK_PARAMETERS] = {NULL};
     for (uint32_t r = 0; r < measurements->count; ++r) {
       if (!isfinite(predicted_n[r])) continue;
       product += predicted_n[r] * measurements->data[r].force_n;

@@ -49,7 +49,7 @@ interface PaperReport {
   figures: Record<string, Figure>;
 }
 
-const mark = (verdict: Verdict): HTMLElement => h("span", { class: `verdict ${verdict.replace(/ /g, "-")}` }, verdict);
+const mark = (verdict: Verdict): HTMLElement => h("span", { class: `claim-verdict ${verdict.replace(/ /g, "-")}` }, verdict);
 
 /** A file's drawing within the page, with the page's style for its words. */
 function drawn(figure: Figure): SVGElement | null {
@@ -85,7 +85,7 @@ function showFigures(page: Page, report: PaperReport): void {
 }
 
 function showTables(page: Page, report: PaperReport): void {
-  const section = page.section("tables", "Tables");
+  const section = page.section("paper-tables", "Tables");
   for (const [id, table] of Object.entries(report.tables)) {
     section.append(h("h3", { id: `table-${id}` }, table.title));
     const columns = Object.keys(table.columns);
