@@ -33,7 +33,7 @@ list+=" $(checks_of penalty_suits 'impulse_energy_error<=1e-12 impulse_energy_er
 list+=" $(checks_of contact_linear 'volume_error_percent<=1 verdict=holds')"
 list+=" $(checks_of explicit_diverges 'farthest_percent<=2 verdict=holds')"
 list+=" $(checks_of larger_steps_outweigh 'step_ratio>=2')"
-list+=" $(checks_of elements_slower 'two_layer_step_ms>0 condensed_from_whole<=1e-10 condensed_from_engine<=1e-4')"
+list+=" $(checks_of elements_slower 'two_layer_step_ms>=0 condensed_from_whole<=1e-10 condensed_from_engine<=1e-4')"
 list+=" $(checks_of linear_solid_inconvenient 'linear_percent>=5')"
 list+=" $(checks_of sparse_storage 'ratio>=100 verdict=holds')"
 list+=" $(checks_of inversion_cubic 'difference<=1e-7 crossover_nodes:number')"
