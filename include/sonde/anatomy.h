@@ -15,8 +15,6 @@
 extern "C" {
 #endif
 
-typedef enum sonde_sex { SONDE_SEX_DRAWN, SONDE_SEX_FEMALE, SONDE_SEX_MALE } sonde_sex;
-
 /**
  * The parameters: member, name and unit at the boundary, SI per unit, least and largest value (SI),
  * meaning. Distributions: docs/anatomy.md.

@@ -36,6 +36,7 @@
 #include "sonde/haptics_local.h"
 #include "sonde/haptics_render.h"
 #include "sonde/files.h"
+#include "sonde/limb.h"
 #include "sonde/exam.h"
 #include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"

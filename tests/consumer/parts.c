@@ -9,6 +9,7 @@ int main(void) {
   sonde_scene *scene = NULL;
   sonde_site_table table;
   sonde_recording_info info;
+  sonde_limb_body body = sonde_limb_unknown();
   sonde_error error;
   if (sonde_image_create(2, 2, &image, &error) != SONDE_OK) return 1;
   int good = sonde_image_save_png(&image, "/nowhere/a.png", &error) == SONDE_IO;
@@ -16,7 +17,9 @@ int main(void) {
   good = good && sonde_scene_load("/nowhere/a.yaml", NULL, &scene, &error) == SONDE_IO;
   good = good && sonde_site_table_load("/nowhere/a.csv", &table, &error) == SONDE_IO;
   good = good && sonde_recording_inspect("/nowhere/a.rec", false, &info, &error) == SONDE_IO;
+  body.bmi = 99;
+  good = good && sonde_limb_draw(&body, 1, &body, &error) == SONDE_ARGUMENT;
   sonde_image_clear(&image);
-  printf("files, sweep, scene, fit, exam: %s\n", good ? "work" : "FAIL");
+  printf("files, limb, sweep, scene, fit, exam: %s\n", good ? "work" : "FAIL");
   return !good;
 }

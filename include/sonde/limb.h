@@ -1,0 +1,117 @@
+/**
+ * @file limb.h
+ * A lower limb from a body and a seed, external iliac vessels to ankle: bones, muscles, fasciae,
+ * fat, skin, vessels and nerves, with an exact label at every point. docs/limb.md.
+ *
+ * Frame: origin at the centre of the hip joint, x to the medial side, y to the front, z up; metres.
+ * The knee joint line is at (0, 0, -thigh_length_m), the ankle joint calf_length_m below it. A left
+ * limb is the mirror in x, so that x of a left limb points to the lateral side.
+ * Level: -0.2 to 1 from above the hip (0) to the knee joint line (1), 1 to 2 from there to the
+ * ankle joint. Angle: from the front (0) through medial (pi/2), back (pi) and lateral, on both
+ * sides.
+ */
+#ifndef SONDE_LIMB_H
+#define SONDE_LIMB_H
+
+#include "sonde/geometry.h"
+#include "sonde/tissue_anatomy.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum sonde_limb_side { SONDE_LIMB_RIGHT, SONDE_LIMB_LEFT } sonde_limb_side;
+
+/**
+ * The parameters of a body: member, name and unit at the boundary, SI per unit, least and largest
+ * value (SI), meaning. Distributions: docs/limb.md.
+ */
+#define SONDE_LIMB_LIST(X)                                                                         \
+  X(age_y, "age-y", 1, 18, 95, "age in years")                                                     \
+  X(stature_m, "stature-cm", 1e-2, 1.4, 2.1, "stature")                                            \
+  X(bmi, "bmi", 1, 15, 45, "body mass index, kg/m2")                                               \
+  X(thigh_length_m, "thigh-length-mm", 1e-3, 0.32, 0.54, "hip joint centre to knee joint line")    \
+  X(calf_length_m, "calf-length-mm", 1e-3, 0.28, 0.52, "knee joint line to ankle joint")           \
+  X(girth_thigh_m, "girth-thigh-mm", 1e-3, 0.38, 1, "girth of the thigh at the gluteal fold")      \
+  X(girth_knee_m, "girth-knee-mm", 1e-3, 0.27, 0.65, "girth of the thigh above the patella")       \
+  X(girth_calf_m, "girth-calf-mm", 1e-3, 0.25, 0.6, "largest girth of the calf")                   \
+  X(girth_ankle_m, "girth-ankle-mm", 1e-3, 0.16, 0.33, "least girth above the ankle")              \
+  X(fat_front_m, "fat-front-mm", 1e-3, 0.002, 0.06, "fat at mid-thigh, front")                     \
+  X(fat_medial_m, "fat-medial-mm", 1e-3, 0.002, 0.08, "fat at mid-thigh, medial side")             \
+  X(fat_lateral_m, "fat-lateral-mm", 1e-3, 0.0015, 0.06, "fat at mid-thigh, lateral side")         \
+  X(fat_back_m, "fat-back-mm", 1e-3, 0.002, 0.06, "fat at mid-thigh, back")                        \
+  X(fat_groin_m, "fat-groin-mm", 1e-3, 0.002, 0.07, "fat in front of the femoral vessels")         \
+  X(fat_popliteal_m, "fat-popliteal-mm", 1e-3, 0.002, 0.04, "fat behind the knee")                 \
+  X(fat_calf_m, "fat-calf-mm", 1e-3, 0.002, 0.04, "fat behind the calf")                           \
+  X(fat_calf_medial_m, "fat-calf-medial-mm", 1e-3, 0.002, 0.04, "fat of the calf, medial side")    \
+  X(fat_shin_m, "fat-shin-mm", 1e-3, 0.001, 0.015, "fat on the tibia's medial face")               \
+  X(skin_m, "skin-mm", 1e-3, 0.001, 0.003, "thickness of the skin")                                \
+  X(head_m, "femoral-head-mm", 1e-3, 0.034, 0.06, "diameter of the femoral head")                  \
+  X(offset_m, "femoral-offset-mm", 1e-3, 0.022, 0.062, "centre of the head to the shaft's axis")   \
+  X(neck_shaft_rad, "neck-shaft-deg", 0.017453292519943295, 1.92, 2.62, "neck to shaft")           \
+  X(anteversion_rad, "anteversion-deg", 0.017453292519943295, -0.26, 0.7, "neck before the plane") \
+  X(shaft_m, "femoral-shaft-mm", 1e-3, 0.02, 0.036, "diameter of the femur at mid-shaft")          \
+  X(bow_m, "femoral-bow-mm", 1e-3, 0.5, 2.5, "radius of the shaft's anterior bow")                 \
+  X(epicondylar_m, "epicondylar-mm", 1e-3, 0.06, 0.1, "width of the condyles")                     \
+  X(condyle_m, "condyle-mm", 1e-3, 0.046, 0.08, "condyles, front to back")                         \
+  X(patella_m, "patella-mm", 1e-3, 0.032, 0.056, "height of the patella")                          \
+  X(plateau_m, "plateau-mm", 1e-3, 0.056, 0.095, "width of the tibial plateau")                    \
+  X(tibia_m, "tibial-shaft-mm", 1e-3, 0.016, 0.032, "width of the tibia half-way down")            \
+  X(torsion_rad, "tibial-torsion-deg", 0.017453292519943295, 0, 1.05, "external tibial torsion")   \
+  X(fibula_m, "fibula-mm", 1e-3, 0.009, 0.018, "diameter of the fibula's shaft")                   \
+  X(malleoli_m, "malleoli-mm", 1e-3, 0.052, 0.095, "width over the malleoli with skin")
+
+/** Muscles that have a volume of their own factor. */
+enum { SONDE_LIMB_MUSCLES = 32 };
+
+/** A body by its parameters; NaN (and SONDE_SEX_DRAWN) stands for one that is to be drawn. */
+typedef struct sonde_limb_body {
+  sonde_sex sex;
+  sonde_limb_side side;
+  uint64_t seed; /**< of what has no parameter: muscle shares, vessels' variants */
+#define SONDE_LIMB_MEMBER(member, name, unit, low, high, text) double member;
+  SONDE_LIMB_LIST(SONDE_LIMB_MEMBER)
+#undef SONDE_LIMB_MEMBER
+  double share[SONDE_LIMB_MUSCLES]; /**< volume of each muscle against the rule; NaN: drawn */
+} sonde_limb_body;
+
+/** One row of SONDE_LIMB_LIST. */
+typedef struct sonde_limb_parameter {
+  const char *name; /**< as on the command line, with the unit */
+  const char *text;
+  double unit; /**< SI per unit */
+  double low, high;
+  size_t offset; /**< of the member */
+} sonde_limb_parameter;
+
+/** The parameters in the order of SONDE_LIMB_LIST. @thread any */
+SONDE_API const sonde_limb_parameter *sonde_limb_parameters(uint32_t *count);
+/** A right limb of which everything is to be drawn. @thread any */
+SONDE_API sonde_limb_body sonde_limb_unknown(void);
+
+/**
+ * Draws what is not known by the population's rules. A value depends on the seed, its parameter and
+ * what its rule names (girths on stature and BMI, for instance), not on which others are known.
+ * @return ARGUMENT naming a known parameter out of range, or two that no body has together
+ * @thread any
+ */
+SONDE_API sonde_status sonde_limb_draw(const sonde_limb_body *known, uint64_t seed,
+                                       sonde_limb_body *body, sonde_error *error);
+
+/** A limb. */
+typedef struct sonde_limb sonde_limb;
+
+/**
+ * Makes the limb of a drawn body.
+ * @param[out] limb owned by the caller
+ * @return ARGUMENT when fat and bones leave no room for muscle, naming the level
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_limb_create(const sonde_limb_body *body, sonde_limb **limb,
+                                         sonde_error *error);
+SONDE_API void sonde_limb_destroy(sonde_limb *limb); /**< NULL is ignored. @thread owner */
+
+#ifdef __cplusplus
+}
+#endif
+#endif
