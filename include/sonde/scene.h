@@ -1,8 +1,8 @@
 /**
  * @file scene.h
- * Scenes of several bodies: rigid bodies, surfaces of springs, lattices of springs, the two-layer
- * tissue; contact and friction between any two of them; one implicit step for all. The file format
- * and the mathematics: docs/scene.md.
+ * Scenes of several bodies: rigid bodies, surfaces of springs, lattices of springs, two-layer and
+ * volumetric tissues; contact and friction between any two of them; one implicit step for all. The
+ * file format and the mathematics: docs/scene.md.
  */
 #ifndef SONDE_SCENE_H
 #define SONDE_SCENE_H
@@ -15,10 +15,11 @@ extern "C" {
 #endif
 
 typedef enum sonde_body_kind {
-  SONDE_BODY_RIGID,     /**< six degrees of freedom; mass, centre and inertia of its mesh */
-  SONDE_BODY_SPRINGS,   /**< a surface: every edge a spring-damper, mass lumped by area */
-  SONDE_BODY_LATTICE,   /**< a solid: tetrahedra whose edges are spring-dampers */
-  SONDE_BODY_TWO_LAYER, /**< a thigh model: surface springs and nonlinear normal springs */
+  SONDE_BODY_RIGID,      /**< six degrees of freedom; mass, centre and inertia of its mesh */
+  SONDE_BODY_SPRINGS,    /**< a surface: every edge a spring-damper, mass lumped by area */
+  SONDE_BODY_LATTICE,    /**< a solid: tetrahedra whose edges are spring-dampers */
+  SONDE_BODY_TWO_LAYER,  /**< a thigh model: surface springs and nonlinear normal springs */
+  SONDE_BODY_VOLUMETRIC, /**< a thigh model of springs or tetrahedra through its volume */
 } sonde_body_kind;
 
 typedef enum sonde_body_motion {

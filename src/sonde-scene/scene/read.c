@@ -349,7 +349,8 @@ sonde_status sonde_scene_parse(const char *text, const char *name, const char *t
       hash = sonde_hash(hash, b->surface.vertices, b->surface.vertex_count * sizeof(sonde_vec3));
       hash = sonde_hash(hash, b->surface.faces, b->surface.face_count * sizeof *b->surface.faces);
       hash = sonde_hash(hash, b->node, b->node_count * sizeof *b->node);
-      if (b->model) hash = sonde_hash(hash, &b->model->checksum, sizeof b->model->checksum);
+      const sonde_model *model = b->model ? b->model : b->solid;
+      if (model) hash = sonde_hash(hash, &model->checksum, sizeof model->checksum);
     }
     scene->checksum = hash;
   } else

@@ -1,9 +1,11 @@
 // One body of a scene file.
-#include "scene/scene.h"
+#include "scene/lattice.h"
 
 #include "base/base.h"
 #include "base/maths.h"
 #include "geometry/internal.h"
+#include "tissue/bulk/blocks.h"
+#include "tissue/nodes.h"
 
 #include <string.h>
 
@@ -181,12 +183,13 @@ static void read_rigid(const sonde_scene_source *source, sonde_place at, sonde_b
     sonde_convex_clear(&body->convex);
 }
 
-static void read_two_layer(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
+// A thigh of two layers, or one of springs or tetrahedra through its volume.
+static void read_model(const sonde_scene_source *source, sonde_place at, sonde_body *body) {
   sonde_reader *reader = source->reader;
   const char *name = sonde_read_text(reader, at, "model", true);
   if (!name) return;
   char path[1024];
-  bool bundled = strcmp(name, "thigh") == 0;
+  bool bundled = strcmp(name, "thigh") == 0, solid = body->kind == SONDE_BODY_VOLUMETRIC;
   if (bundled && !source->thigh) {
     sonde_reader_fail(reader, sonde_read_find(reader, at, "model"), SONDE_NOT_FOUND,
                       "the bundled thigh was not found");
@@ -194,28 +197,33 @@ static void read_two_layer(const sonde_scene_source *source, sonde_place at, son
   }
   sonde_source_path(source, name, path, sizeof path);
   sonde_error error = {0};
-  sonde_status status = sonde_model_load(bundled ? source->thigh : path, &body->model, &error);
-  if (!status && body->model->bulk)
-    status = sonde_fail(&error, SONDE_ARGUMENT,
-                        "%.300s: a volumetric model, expected a two-layer one", path);
-  if (!status) status = sonde_mesh_copy(&body->model->surface, &body->surface, &error);
-  uint32_t nodes = body->surface.vertex_count;
+  sonde_model **model = solid ? &body->solid : &body->model;
+  sonde_status status = sonde_model_load(bundled ? source->thigh : path, model, &error);
+  if (!status && solid != ((*model)->bulk != NULL))
+    status = sonde_fail(&error, SONDE_ARGUMENT, "%.300s: a %s model, expected kind: %s", path,
+                        solid ? "two-layer" : "volumetric", solid ? "two_layer" : "volumetric");
+  if (!status) status = sonde_mesh_copy(&(*model)->surface, &body->surface, &error);
+  uint32_t skin = body->surface.vertex_count, pairs = 0;
+  sonde_nodes nodes = {0};
   if (!status) {
-    body->node_count = nodes;
-    body->node = SONDE_NEW(sonde_vec3, nodes);
-    body->node_mass_kg = SONDE_NEW(double, nodes);
-    body->held = SONDE_NEW(uint8_t, nodes);
-    body->load_n = SONDE_NEW(sonde_vec3, nodes);
-    if (!body->node || !body->node_mass_kg || !body->held || !body->load_n)
-      status = sonde_fail_memory(&error);
+    nodes = sonde_model_nodes(*model);
+    pairs = solid ? sonde_bulk_pairs((*model)->bulk, NULL) : 0;
+    status = sonde_body_allocate(body, nodes.count, pairs, &error);
+  }
+  if (!status && solid) {
+    body->surface_node = SONDE_NEW(uint32_t, skin);
+    if (!body->surface_node) status = sonde_fail_memory(&error);
   }
   if (status) {
     sonde_reader_pass(reader, sonde_read_find(reader, at, "model"), &error);
     return;
   }
   body->sags = sonde_read_bool(reader, at, "sags", false);
-  memcpy(body->node, body->surface.vertices, nodes * sizeof *body->node);
-  memcpy(body->node_mass_kg, body->model->mass_kg, nodes * sizeof *body->node_mass_kg);
+  memcpy(body->node, nodes.rest, nodes.count * sizeof *body->node);
+  memcpy(body->node_mass_kg, nodes.mass_kg, nodes.count * sizeof *body->node_mass_kg);
+  if (!solid) return;
+  sonde_bulk_pairs((*model)->bulk, body->pairs);
+  for (uint32_t i = 0; i < skin; ++i) body->surface_node[i] = i;
 }
 
 typedef struct box {
@@ -258,8 +266,8 @@ static void read_deformable(const sonde_scene_source *source, sonde_place at, so
   sonde_place lattice = sonde_read_find(reader, at, "lattice");
   if (body->motion == SONDE_BODY_DRIVEN)
     sonde_reader_fail(reader, at, SONDE_FORMAT, "only a rigid body can be driven");
-  if (body->kind == SONDE_BODY_TWO_LAYER)
-    read_two_layer(source, at, body);
+  if (body->kind == SONDE_BODY_TWO_LAYER || body->kind == SONDE_BODY_VOLUMETRIC)
+    read_model(source, at, body);
   else if (body->kind == SONDE_BODY_LATTICE)
     sonde_read_lattice(source, at, body);
   else {
@@ -281,6 +289,9 @@ static void read_deformable(const sonde_scene_source *source, sonde_place at, so
     sum = v_madd(sum, body->node_mass_kg[i], body->node[i]);
   }
   body->mass = (sonde_mass){.mass_kg = mass, .centre_m = v_scale(sum, 1 / mass)};
+  uint32_t inner = body->solid ? body->node_count + body->solid->bulk->held_count : 0;
+  for (uint32_t i = 0; i < inner; ++i) // those that the bone holds too
+    body->solid->bulk->node[i] = pose_apply(body->start, body->solid->bulk->node[i]);
   for (uint32_t i = 0; body->model && i < body->node_count; ++i) {
     body->model->surface.vertices[i] = body->node[i];
     body->model->normal[i] = q_rotate(body->start.rotation, body->model->normal[i]);
@@ -319,7 +330,8 @@ void sonde_read_body(const sonde_scene_source *source, sonde_place at, const son
                                      "density_kg_m2", "density_kg_m3", "velocity_m_s", "spin_rad_s",
                                      "path",          "springs",       "lattice",      "model",
                                      "held_mm",       "loads",         "sags",         NULL};
-  static const char *const KINDS[] = {"rigid", "springs", "lattice", "two_layer", NULL};
+  static const char *const KINDS[] = {"rigid",     "springs",    "lattice",
+                                      "two_layer", "volumetric", NULL};
   static const char *const MOTIONS[] = {"free", "fixed", "driven", NULL};
   sonde_reader *reader = source->reader;
   sonde_read_keys(reader, at, "a body", KEYS);
@@ -371,4 +383,5 @@ void sonde_body_clear(sonde_body *body) {
   sonde_free(body->spring);
   sonde_free(body->crease);
   sonde_model_destroy(body->model);
+  sonde_model_destroy(body->solid);
 }

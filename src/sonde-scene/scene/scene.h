@@ -72,6 +72,7 @@ typedef struct sonde_body {
   double rest_volume_m3; // closed
   uint32_t first_pair;
   sonde_model *model; // two-layer
+  sonde_model *solid; // volumetric, its nodes where they start
   bool sags;          // its weight deforms it; else its shape is the one under its weight
 } sonde_body;
 
@@ -114,6 +115,10 @@ struct sonde_scene {
 
 static inline bool sonde_body_is_rigid(const sonde_body *body) {
   return body->kind == SONDE_BODY_RIGID;
+}
+// Whether a body weighs: the shape of a scanned thigh is the one under its weight.
+static inline bool sonde_body_weighs(const sonde_body *body) {
+  return (!body->model && !body->solid) || body->sags;
 }
 static inline bool sonde_body_is_convex(const sonde_body *body) {
   return body->convex.hull.vertex_count > 0;

@@ -94,6 +94,7 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   CARVE(s->cast_known, bodies);
   CARVE(s->fitted, bodies);
   CARVE(s->body_inverse, bodies);
+  CARVE(s->solid, bodies);
   CARVE(s->part, bodies);
   CARVE(s->island, bodies);
   CARVE(s->loose, bodies);
@@ -256,13 +257,17 @@ sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_stat
   if (!status)
     status = sonde_block_matrix_create(scene->slot_count, scene->pair_count,
                                        (const uint32_t(*)[2])scene->pairs, &state->matrix, error);
+  for (uint32_t b = 0; b < scene->body_count && !status; ++b)
+    if (scene->bodies[b].solid)
+      status = sonde_bulk_blocks_create(scene->bodies[b].solid, &state->solid[b], error);
   if (status) {
     sonde_scene_state_destroy(state);
     return status;
   }
   for (uint32_t b = 0; b < scene->body_count; ++b) {
     const sonde_body *body = &scene->bodies[b];
-    state->loose[b] = body->motion == SONDE_BODY_FREE && !body->model;
+    bool anchored = body->model || (body->solid && body->solid->bulk->held_count);
+    state->loose[b] = body->motion == SONDE_BODY_FREE && !anchored;
     for (uint32_t k = 0; k < body->node_count; ++k) state->loose[b] &= !body->held[k];
   }
   for (uint32_t k = 0; k < scene->pin_count; ++k)
@@ -276,8 +281,10 @@ sonde_status sonde_scene_state_create(const sonde_scene *scene, sonde_scene_stat
 
 void sonde_scene_state_destroy(sonde_scene_state *state) {
   if (!state) return;
-  for (uint32_t b = 0; state->block && b < state->scene->body_count; ++b)
+  for (uint32_t b = 0; state->block && b < state->scene->body_count; ++b) {
     sonde_face_tree_destroy(state->tree[b]);
+    sonde_bulk_blocks_destroy(state->solid[b]);
+  }
   sonde_overlap_destroy(state->overlap[0]);
   sonde_overlap_destroy(state->overlap[1]);
   sonde_sweep_destroy(state->sweep);
@@ -404,9 +411,11 @@ sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t 
     m.centre_m = v_scale(sum, 1 / body->mass.mass_kg);
     m.velocity_m_s = v_scale(m.momentum_kg_m_s, 1 / body->mass.mass_kg);
     m.rotation = quat_identity();
-    m.elastic_j = body->model ? sonde_tissue_energy(body->model, x) : sonde_network_energy(body, x);
+    m.elastic_j = body->model   ? sonde_tissue_energy(body->model, x)
+                  : body->solid ? sonde_bulk_energy(state->solid[b], x)
+                                : sonde_network_energy(body, x);
   }
-  if (body->motion == SONDE_BODY_FREE && (!body->model || body->sags))
+  if (body->motion == SONDE_BODY_FREE && sonde_body_weighs(body))
     m.gravity_j = -body->mass.mass_kg * v_dot(state->scene->gravity_m_s2, m.centre_m);
   return m;
 }

@@ -5,6 +5,7 @@
 
 #include "scene/scene.h"
 #include "contact/contact.h"
+#include "tissue/bulk/blocks.h"
 #include "tissue/two_layer/linearise.h"
 
 // What a step hands to the next, in one block: copied for substeps, written by snapshots.
@@ -102,6 +103,7 @@ struct sonde_scene_state {
   bool *cast_known;           // [bodies] scratch: cast_box has been made
   bool *fitted;               // [bodies] surface and tree are those of the sleeping body
   sonde_mat3 *body_inverse;   // [bodies] inverse inertia in the body's frame
+  sonde_bulk_blocks **solid;  // [bodies] of volumetric bodies
 
   // contact
   sonde_face_tree **tree;    // [bodies], NULL for what never touches

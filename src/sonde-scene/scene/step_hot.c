@@ -27,25 +27,29 @@ static void linearise(sonde_scene_state *state, const sonde_tissue_scales *scale
       state->force[body->first_slot] = v_scale(state->scene->gravity_m_s2, body->mass.mass_kg);
       continue;
     }
+    // The part of the matrix that belongs to one body.
+    uint32_t first = body->first_slot;
+    sonde_block_matrix part = {.row_count = body->node_count,
+                               .pair_count = body->model ? body->model->topology.edge_count
+                                                         : body->spring_count,
+                               .diagonal = state->matrix->diagonal + first,
+                               .upper = state->matrix->upper + body->first_pair,
+                               .inverse = state->matrix->inverse + first};
     if (body->model) {
-      // The part of the matrix that belongs to one body.
-      uint32_t first = body->first_slot;
-      sonde_block_matrix part = {.row_count = body->node_count,
-                                 .pair_count = body->model->topology.edge_count,
-                                 .pairs = (const uint32_t(*)[2])body->model->topology.edges,
-                                 .diagonal = state->matrix->diagonal + first,
-                                 .upper = state->matrix->upper + body->first_pair,
-                                 .inverse = state->matrix->inverse + first};
+      part.pairs = (const uint32_t(*)[2])body->model->topology.edges;
       sonde_tissue_linearise(
           body->model, state->part[b].row_count < body->node_count ? &state->part[b] : NULL,
           state->stage_position + first, state->stage_velocity + first, scales,
           state->force + first, state->product + first, &part, state->tissue_nodes);
-    } else
+    } else if (body->solid)
+      sonde_bulk_linearise(state->solid[b], state->stage_position + first,
+                           state->stage_velocity + first, scales, state->force + first,
+                           state->product + first, &part);
+    else
       sonde_network_linearise(state, b, scales);
     // The forces of sleepers are not made anew.
     uint32_t count = body->model ? state->part[b].row_count : body->node_count;
-    bool weighs = !body->model || body->sags;
-    sonde_vec3 gravity = weighs ? state->scene->gravity_m_s2 : vec3(0, 0, 0);
+    sonde_vec3 gravity = sonde_body_weighs(body) ? state->scene->gravity_m_s2 : vec3(0, 0, 0);
     for (uint32_t r = 0; r < count; ++r) {
       uint32_t i = body->model ? state->part[b].rows[r] : r;
       sonde_vec3 *f = &state->force[body->first_slot + i];

@@ -105,6 +105,12 @@ INLINE edge_pull pull_biphasic(const biphasic_law *law, reals rest, const reals 
   return at;
 }
 
+// Its energy at a length.
+INLINE reals biphasic_energy(const biphasic_law *law, reals rest, reals length) {
+  reals stretch = length - rest, beyond = larger(stretch - law->knee, all(0));
+  return (law->stiffness * stretch * stretch + (law->steep - law->stiffness) * beyond * beyond) / 2;
+}
+
 // A |grad s|^2 over a face with indentations s at its corners and half the cotangents there;
 // across[] makes half the cotangent Laplacian of s at corner k, across[k + 2] - across[k + 1].
 INLINE reals square_slope(const reals half_cotangent[3], const reals s[3], reals across[3]) {

@@ -3,6 +3,7 @@
 #ifndef SONDE_SRC_NODES_H
 #define SONDE_SRC_NODES_H
 
+#include "base/link.h"
 #include "sonde/tissue.h"
 
 // Borrowed from a model.
@@ -14,7 +15,7 @@ typedef struct sonde_nodes {
 } sonde_nodes;
 
 // @thread any
-sonde_nodes sonde_model_nodes(const sonde_model *model);
+SONDE_LINK sonde_nodes sonde_model_nodes(const sonde_model *model);
 
 // A node's move from a displacement u, as far as one step of a search for equilibrium may take it.
 // @thread tick

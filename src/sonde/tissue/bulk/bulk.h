@@ -59,6 +59,9 @@ typedef struct sonde_bulk_graph {
 sonde_status sonde_bulk_graph_create(const sonde_model *model, sonde_bulk_graph *graph,
                                      sonde_error *error);
 void sonde_bulk_graph_clear(sonde_bulk_graph *graph);
+// Elastic energy of the moving nodes' places, J. @thread any
+double sonde_bulk_graph_energy(const sonde_model *model, const sonde_bulk_graph *graph,
+                               const sonde_vec3 *position);
 
 // Whether tetrahedra of a kind carry stress themselves.
 bool sonde_bulk_is_solid(const sonde_model *model);

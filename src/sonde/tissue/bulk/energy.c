@@ -1,0 +1,44 @@
+// Elastic energy of a volumetric body, one spring and one tetrahedron after the other.
+#define SONDE_REAL_SCALAR
+#include "elements/material.h"
+#include "tissue/bulk/bulk.h"
+#include "tissue/laws.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+double sonde_bulk_graph_energy(const sonde_model *model, const sonde_bulk_graph *graph,
+                               const sonde_vec3 *position) {
+  const sonde_bulk *bulk = model->bulk;
+  uint32_t n = bulk->node_count;
+  SONDE_ASSERT(n > 0 && graph->start != NULL);
+  double energy = 0;
+  // Both moving ends of a spring name it, of a spring to the bone one.
+  for (uint32_t i = 0; graph->spring && i < n; ++i)
+    for (uint32_t k = graph->start[i]; k < graph->start[i + 1]; ++k) {
+      uint32_t j = graph->neighbour[k];
+      const sonde_bulk_spring *spring = &graph->spring[k];
+      double rest = v_distance(bulk->node[i], bulk->node[j]);
+      double length = v_distance(position[i], j < n ? position[j] : bulk->node[j]);
+      const biphasic_law law = {spring->stiffness_n_m, spring->steep_n_m, spring->knee * rest};
+      energy += (j < n ? 0.5 : 1) * biphasic_energy(&law, rest, length);
+    }
+  for (uint32_t e = 0; model->kind != SONDE_LATTICE && e < bulk->element_count; ++e) {
+    const uint32_t *v = bulk->element[e];
+    sonde_vec3 gradient[4];
+    double volume = sonde_bulk_gradients(bulk, e, gradient), mu, lambda;
+    double f[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    sonde_bulk_solid(model, e, &mu, &lambda);
+    for (int c = 0; c < 4; ++c) {
+      if (v[c] >= n) continue;
+      sonde_vec3 u = v_sub(position[v[c]], bulk->node[v[c]]);
+      const double move[3] = {u.x, u.y, u.z};
+      const double slope[3] = {gradient[c].x, gradient[c].y, gradient[c].z};
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) f[3 * i + j] += move[i] * slope[j];
+    }
+    bool linear = model->kind == SONDE_LINEAR_SOLID;
+    energy += volume * material_energy(linear ? SONDE_LINEAR : SONDE_NEO_HOOKEAN, mu, lambda, f);
+  }
+  return energy;
+}
