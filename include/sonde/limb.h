@@ -98,6 +98,16 @@ SONDE_API sonde_limb_body sonde_limb_unknown(void);
 SONDE_API sonde_status sonde_limb_draw(const sonde_limb_body *known, uint64_t seed,
                                        sonde_limb_body *body, sonde_error *error);
 
+/** Bones, in this order. The pelvis is the part beside the groin. */
+typedef enum sonde_limb_bone {
+  SONDE_LIMB_PELVIS,
+  SONDE_LIMB_FEMUR,
+  SONDE_LIMB_PATELLA,
+  SONDE_LIMB_TIBIA,
+  SONDE_LIMB_FIBULA,
+  SONDE_LIMB_BONES
+} sonde_limb_bone;
+
 /** A limb. */
 typedef struct sonde_limb sonde_limb;
 
@@ -110,6 +120,82 @@ typedef struct sonde_limb sonde_limb;
 SONDE_API sonde_status sonde_limb_create(const sonde_limb_body *body, sonde_limb **limb,
                                          sonde_error *error);
 SONDE_API void sonde_limb_destroy(sonde_limb *limb); /**< NULL is ignored. @thread owner */
+
+/** Tissues, those of higher priority last. */
+typedef enum sonde_limb_tissue {
+  SONDE_LIMB_OUTSIDE,
+  SONDE_LIMB_SKIN,
+  SONDE_LIMB_FAT, /**< under the skin; index 1: between the muscles, and what fills pelvis and knee
+                   */
+  SONDE_LIMB_SUPERFICIAL_FASCIA,
+  SONDE_LIMB_FASCIA,
+  SONDE_LIMB_SEPTUM,
+  SONDE_LIMB_MUSCLE,
+  SONDE_LIMB_TENDON,
+  SONDE_LIMB_SHEATH, /**< loose fat around vessels */
+  SONDE_LIMB_NODE,
+  SONDE_LIMB_NERVE,
+  SONDE_LIMB_WALL,
+  SONDE_LIMB_LUMEN,
+  SONDE_LIMB_BONE,
+  SONDE_LIMB_TISSUES
+} sonde_limb_tissue;
+
+/** What is at a point. */
+typedef struct sonde_limb_label {
+  sonde_limb_tissue tissue;
+  uint32_t index; /**< of the muscle, bone, tendon, septum, vessel, nerve or node */
+  sonde_limb_side side;
+} sonde_limb_label;
+
+/** Name of a tissue: "muscle". Never NULL. @thread any */
+SONDE_API const char *sonde_limb_tissue_name(sonde_limb_tissue tissue);
+/** Name of a structure: "vastus lateralis"; that of the tissue when the structure has none.
+ * @thread any */
+SONDE_API const char *sonde_limb_name(const sonde_limb *limb, sonde_limb_label label);
+/** The label of a point (m): bone before lumen, wall, nerve, node, sheath, tendon, muscle, septum,
+ * fascia and fat. @thread any */
+SONDE_API sonde_limb_label sonde_limb_at(const sonde_limb *limb, sonde_vec3 point);
+
+/** Signed distances of a point, m; negative inside. */
+typedef struct sonde_limb_distances {
+  double skin;   /**< to the skin's outer face */
+  double fascia; /**< to the deep fascia */
+  double bone;   /**< to the nearest bone */
+  double vessel; /**< to the nearest lumen, nerve or node; infinite without vessels */
+} sonde_limb_distances;
+/** Distances, exact to first order at the surface. @thread any */
+SONDE_API sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 point);
+
+/** Unit direction of the muscle fibres at a point, downwards; false outside muscles. @thread any */
+SONDE_API bool sonde_limb_fibre(const sonde_limb *limb, sonde_vec3 point, sonde_vec3 *direction);
+
+/** A point by level, angle (rad) and fraction of the fascia's radius, and back. @thread any */
+SONDE_API sonde_vec3 sonde_limb_point(const sonde_limb *limb, double level, double angle, double f);
+SONDE_API void sonde_limb_polar(const sonde_limb *limb, sonde_vec3 point, double *level,
+                                double *angle, double *f);
+
+/** A muscle of a limb, as measured. */
+typedef struct sonde_limb_muscle {
+  const char *name;
+  double volume_m3;
+  double rule_m3;    /**< by the rule of stature, mass, sex and age with the muscle's own share */
+  double largest_m2; /**< area of the largest cross-section */
+  double largest_level;
+  double pennation_rad, fibre_m;
+} sonde_limb_muscle;
+/** Number of muscles. @thread any */
+SONDE_API uint32_t sonde_limb_muscle_count(void);
+/** Measures a muscle, index below the number of muscles. @thread any */
+SONDE_API sonde_limb_muscle sonde_limb_muscle_at(const sonde_limb *limb, uint32_t index);
+/** Area of a muscle at a level, and that of its rule times the section's common scale; m2.
+ * @thread any */
+SONDE_API double sonde_limb_muscle_section(const sonde_limb *limb, uint32_t index, double level,
+                                           double *rule_m2);
+/** Girth of the skin at a level, m. @thread any */
+SONDE_API double sonde_limb_girth(const sonde_limb *limb, double level);
+/** The body of a limb. @thread any */
+SONDE_API const sonde_limb_body *sonde_limb_body_of(const sonde_limb *limb);
 
 #ifdef __cplusplus
 }

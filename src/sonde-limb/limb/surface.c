@@ -1,6 +1,7 @@
 // Deep fascia, fat and skin: harmonics on cubic splines in level, girths of the body
 // (docs/limb_theory.md).
-#include "limb/frame.h"
+#include "limb/bones.h"
+#include "limb/knots.h"
 
 // Catmull-Rom weights at a fraction between the second and the third of four values.
 static inline void catmull_rom(double u, double w[4]) {
@@ -98,39 +99,6 @@ void limb_polar(const sonde_limb *limb, const double xyz[3], double *level, doub
   *f = sqrt(dx * dx + dy * dy) / limb_fascia_radius(limb, *level, *angle);
 }
 
-// ---- knots in level
-// ------------------------------------------------------------------------------
-
-// Value at x of the C1 cubic through knots[count][columns] (first column: x), with the tangents of
-// the parabola through three neighbours; constant beyond the ends.
-static double through(const double *knots, uint32_t count, uint32_t columns, uint32_t column,
-                      double x) {
-  SONDE_ASSERT(count >= 2 && column > 0 && column < columns);
-#define AT(i) knots[(size_t)(i)*columns]
-#define OF(i) knots[(size_t)(i)*columns + column]
-  if (x <= AT(0)) return OF(0);
-  if (x >= AT(count - 1)) return OF(count - 1);
-  uint32_t k = 0;
-  while (AT(k + 1) < x) ++k;
-  double h = AT(k + 1) - AT(k), u = (x - AT(k)) / h, rise = (OF(k + 1) - OF(k)) / h;
-  double before = rise, after = rise;
-  if (k > 0) {
-    double h0 = AT(k) - AT(k - 1), r0 = (OF(k) - OF(k - 1)) / h0;
-    before = (r0 * h + rise * h0) / (h + h0);
-  }
-  if (k + 2 < count) {
-    double h1 = AT(k + 2) - AT(k + 1), r1 = (OF(k + 2) - OF(k + 1)) / h1;
-    after = (rise * h1 + r1 * h) / (h + h1);
-  }
-  double v = 1 - u;
-  return OF(k) * v * v * (1 + 2 * u) + OF(k + 1) * u * u * (3 - 2 * u) +
-         h * u * v * (before * v - after * u);
-#undef AT
-#undef OF
-}
-#define THROUGH(knots, column, x)                                                                  \
-  through(&(knots)[0][0], SONDE_COUNT_OF(knots), SONDE_COUNT_OF((knots)[0]), column, x)
-
 // Skin girth of the measured leg, mm, and the harmonics of the muscles' envelope: amplitude times
 // cosine and sine of 2 phase (second), 3 phase (third); phases from the front through medial.
 static const double PROFILE[][3] = {
@@ -140,20 +108,19 @@ static const double PROFILE[][3] = {
     {1.72, 246, 0}, {1.86, 217, 0}, {1.93, 222, 0}, {2, 238, 0}};
 // Level, second amplitude and direction (degrees), third amplitude and direction.
 static const double HARMONICS[][5] = {
-    {-0.2, 0.1, 160, 0, 0},         {0, 0.12, 165, 0.01, 30},      {0.12, 0.11, 130, 0.03, 33},
-    {0.25, 0.145, 110, 0.034, 35},  {0.35, 0.165, 116, 0.02, 35},  {0.5, 0.165, 125, 0.019, 35},
-    {0.65, 0.125, 129, 0.012, 20},  {0.75, 0.09, 131, 0.015, 10},  {0.88, 0.03, 120, 0.035, 0},
-    {0.98, 0.03, 60, 0.05, 0},      {1.06, 0.05, 10, 0.055, 0},    {1.15, 0.1, 2, 0.058, 0},
-    {1.25, 0.062, 161, 0.075, 113}, {1.35, 0.065, 155, 0.07, 116}, {1.5, 0.079, 146, 0.065, 119},
-    {1.68, 0.06, 165, 0.05, 118},   {1.85, 0.11, 175, 0.05, 0},    {2, 0.17, 178, 0.06, 0}};
-// Where the section's centre is, as the place (degrees, f) of the bone that the other columns give
-// in mm of a thigh of 430 mm or a calf of 395 mm: hip centre, femoral shaft, tibia.
-static const double CENTRES[][5] = {
-    {-0.2, 15, 0.26, 0, 0},   {0, 18, 0.24, 0, 0},     {0.15, 272, 0.46, -37, -3},
-    {0.25, 274, 0.4, -33, 1}, {0.5, 299, 0.2, -22, 6}, {0.75, 317, 0.21, -11, 1},
-    {0.9, 345, 0.12, -3, 0},  {1, 5, 0.04, 0, -6},     {1.12, 24, 0.42, 2, 2},
-    {1.25, 24, 0.6, 3, 3},    {1.5, 28, 0.6, 3, 3},    {1.75, 25, 0.5, 2, 2},
-    {1.9, 12, 0.3, 1, 0},     {2, 8, 0.22, 0, 0}};
+    {-0.2, 0.1, 160, 0, 0},        {0, 0.12, 165, 0.01, 30},       {0.12, 0.11, 130, 0.03, 33},
+    {0.25, 0.145, 110, 0.034, 35}, {0.35, 0.165, 116, 0.02, 35},   {0.5, 0.165, 125, 0.019, 35},
+    {0.65, 0.125, 129, 0.012, 20}, {0.75, 0.09, 131, 0.015, 10},   {0.86, 0.04, 150, 0.025, 0},
+    {0.93, 0.06, 175, 0.03, 0},    {1, 0.085, 179, 0.03, 0},       {1.06, 0.09, 180, 0.05, 0},
+    {1.15, 0.1, 2, 0.058, 0},      {1.25, 0.062, 161, 0.075, 113}, {1.35, 0.065, 155, 0.07, 116},
+    {1.5, 0.079, 146, 0.065, 119}, {1.68, 0.06, 165, 0.05, 118},   {1.85, 0.09, 178, 0.04, 0},
+    {2, 0.08, 178, 0.05, 0}};
+// Where the section's centre is, as the place (degrees, f) of a bone in it: the hip's centre up to
+// level 0, the femoral shaft down to 1, the tibia below.
+static const double CENTRES[][3] = {
+    {-0.2, 15, 0.26},  {0, 18, 0.24},    {0.15, 272, 0.46}, {0.25, 274, 0.4}, {0.5, 299, 0.2},
+    {0.75, 317, 0.21}, {0.9, 345, 0.12}, {0.99, 5, 0.02},   {1.01, 15, 0.05}, {1.12, 22, 0.46},
+    {1.25, 24, 0.66},  {1.5, 28, 0.66},  {1.75, 25, 0.52},  {1.9, 30, 0.34},  {2, 22, 0.25}};
 
 // Skin girth at a level: the measured profile, scaled to the body's four girths.
 static double girth_at(const sonde_limb_body *b, double level) {
@@ -161,7 +128,7 @@ static double girth_at(const sonde_limb_body *b, double level) {
                              {0.88, log(b->girth_knee_m / 0.3865)},
                              {1.28, log(b->girth_calf_m / 0.3765)},
                              {1.86, log(b->girth_ankle_m / 0.217)}};
-  return 1e-3 * THROUGH(PROFILE, 1, level) * exp(THROUGH(ratio, 1, level));
+  return 1e-3 * KNOTS(PROFILE, 1, level) * exp(KNOTS(ratio, 1, level));
 }
 
 // Fat along the ray: the logarithm of the thickness by two harmonics through the four sides.
@@ -171,20 +138,22 @@ static double fat_at(const sonde_limb_body *b, double level, double angle) {
          back = b->fat_back_m, fold = sqrt(b->fat_popliteal_m * back), shin = b->fat_shin_m,
          calf = b->fat_calf_m, inner = b->fat_calf_medial_m, groin = b->fat_groin_m;
   const double sides[][5] = {
-      {-0.2, log(1.2 * groin), log(1.1 * medial), log(1.3 * hip * lateral), log(1.6 * back)},
-      {0, log(groin), log(1.2 * medial), log(1.25 * hip * lateral), log(1.6 * back)},
+      {-0.2, log(1.2 * groin), log(1.1 * medial), log(1.3 * hip * lateral), log(2.4 * back)},
+      {0, log(groin), log(1.2 * medial), log(1.25 * hip * lateral), log(2.6 * back)},
+      {0.12, log(sqrt(groin * front)), log(1.2 * medial), log(1.15 * hip * lateral),
+       log(1.9 * back)},
       {0.25, log(1.05 * front), log(1.15 * medial), log(hip * lateral), log(1.15 * back)},
       {0.5, log(front), log(medial), log(lateral), log(back)},
       {0.75, log(0.9 * front), log(0.95 * medial), log(0.9 * lateral), log(0.9 * back)},
       {0.93, log(0.5 * front), log(0.75 * medial), log(0.7 * lateral), log(fold)},
       {1, log(0.0035), log(0.65 * medial), log(0.6 * lateral), log(b->fat_popliteal_m)},
-      {1.1, log(1.2 * shin), log(0.9 * inner), log(0.7 * inner), log(b->fat_popliteal_m)},
-      {1.25, log(shin), log(inner), log(0.7 * inner), log(calf)},
-      {1.5, log(0.95 * shin), log(0.8 * inner), log(0.6 * inner), log(0.8 * calf)},
-      {1.75, log(0.9 * shin), log(0.55 * inner), log(0.45 * inner), log(0.55 * calf)},
+      {1.1, log(1.2 * shin), log(0.9 * inner), log(0.9 * inner), log(b->fat_popliteal_m)},
+      {1.25, log(shin), log(inner), log(0.9 * inner), log(calf)},
+      {1.5, log(0.95 * shin), log(0.8 * inner), log(0.75 * inner), log(0.8 * calf)},
+      {1.75, log(0.9 * shin), log(0.55 * inner), log(0.5 * inner), log(0.55 * calf)},
       {2, log(0.9 * shin), log(0.3 * inner), log(0.3 * inner), log(0.5 * calf)}};
-  double f = THROUGH(sides, 1, level), m = THROUGH(sides, 2, level), l = THROUGH(sides, 3, level),
-         p = THROUGH(sides, 4, level);
+  double f = KNOTS(sides, 1, level), m = KNOTS(sides, 2, level), l = KNOTS(sides, 3, level),
+         p = KNOTS(sides, 4, level);
   return exp(0.25 * (f + m + l + p) + 0.5 * (f - p) * cos(angle) + 0.5 * (m - l) * sin(angle) +
              0.25 * (f + p - m - l) * cos(2 * angle));
 }
@@ -214,7 +183,7 @@ static void shape_at(double level, double *around) {
     for (int j = 0; j < 5; ++j) knots[k][j] = row[j];
   }
   for (uint32_t j = 0; j < 2; ++j)
-    second[j] = THROUGH(knots, 1 + j, level), third[j] = THROUGH(knots, 3 + j, level);
+    second[j] = KNOTS(knots, 1 + j, level), third[j] = KNOTS(knots, 3 + j, level);
   for (uint32_t pass = 0; pass < 6; ++pass) {
     double area = 0, mx = 0, my = 0;
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
@@ -228,42 +197,112 @@ static void shape_at(double level, double *around) {
   }
 }
 
+// Outermost radius along a ray at which a bone is nearer than `skin`; 0 when none is.
+static double bone_reach(const sonde_limb *limb, sonde_vec3 centre, double angle, double from,
+                         double skin) {
+  double dx = sin(angle), dy = cos(angle);
+  for (double r = from; r > 0.2 * from;) {
+    const double p[3] = {centre.x + r * dx, centre.y + r * dy, centre.z};
+    double d = limb_bone_distance(limb, p, NULL) - skin;
+    if (d < 1e-4) return r;
+    r -= 0.8 * d;
+  }
+  return 0;
+}
+
+// Radii of the fascia in one section: the shape at the size that gives the skin its girth, outside
+// the bones.
+static double fit_section(const double *around, const double *bone, const double *outside,
+                          double wanted, double *radius) {
+  double size = wanted / (2 * SONDE_PI) - 0.01, fold = 0.0015;
+  for (uint32_t pass = 0; pass < 12; ++pass) {
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+      double r = size * around[c], gap = r - bone[c];
+      radius[c] = bone[c] > 0 ? 0.5 * (r + bone[c] + sqrt(gap * gap + fold * fold)) : r;
+    }
+    size += (wanted - girth_of(radius, 1, outside)) / (2 * SONDE_PI);
+  }
+  return size;
+}
+
+// Moves the centre of a section to the centroid of its contour and reads the contour anew from
+// there.
+static void recentre(double *x, double *y, double *radius) {
+  double px[LIMB_ANGLES + 1], py[LIMB_ANGLES + 1], area = 0, mx = 0, my = 0;
+  for (uint32_t c = 0; c <= LIMB_ANGLES; ++c) {
+    double a = 2 * SONDE_PI * c / LIMB_ANGLES, r = radius[c % LIMB_ANGLES];
+    px[c] = r * sin(a), py[c] = r * cos(a);
+  }
+  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+    double twice = py[c] * px[c + 1] - px[c] * py[c + 1];
+    area += twice / 2, mx += twice * (px[c] + px[c + 1]) / 6, my += twice * (py[c] + py[c + 1]) / 6;
+  }
+  mx /= area, my /= area;
+  *x += mx, *y += my;
+  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+    double a = 2 * SONDE_PI * c / LIMB_ANGLES, dx = sin(a), dy = cos(a);
+    for (uint32_t i = 0; i < LIMB_ANGLES; ++i) {
+      // Ray from the new centre against the side of the contour.
+      double ax = px[i] - mx, ay = py[i] - my, bx = px[i + 1] - mx, by = py[i + 1] - my;
+      double left = dy * ax - dx * ay, right = dy * bx - dx * by;
+      if (left > 0 || right <= 0) continue;
+      double u = left / (left - right);
+      double r = (ax + u * (bx - ax)) * dx + (ay + u * (by - ay)) * dy;
+      if (r > 0) radius[c] = r;
+    }
+  }
+}
+
 sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
+  SONDE_ASSERT(limb->bones);
   const sonde_limb_body *b = &limb->body;
   limb_surface *s = &limb->surface;
-  limb->scale = b->thigh_length_m / 0.430;
+  double(*around)[LIMB_ANGLES] = sonde_calloc(LIMB_ROWS, sizeof *around);
+  if (!around) return sonde_fail_memory(error);
+  double outside[LIMB_ANGLES], none[LIMB_ANGLES] = {0};
+  // Sections as if there were no bones.
   for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
-    double level = LIMB_TOP + r * LIMB_STEP, outside[LIMB_ANGLES], around[LIMB_ANGLES];
+    double level = LIMB_TOP + r * LIMB_STEP;
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
       s->fat[r][c] = fat_at(b, level, 2 * SONDE_PI * c / LIMB_ANGLES);
       outside[c] = s->fat[r][c] + b->skin_m;
     }
-    // Size of the fascia that gives the skin its girth: secant steps.
-    shape_at(level, around);
-    double wanted = girth_at(b, level), size = wanted / (2 * SONDE_PI) - 0.01;
-    for (uint32_t pass = 0; pass < 8; ++pass)
-      size += (wanted - girth_of(around, size, outside)) / (2 * SONDE_PI);
-    if (!(size > 0.02))
+    shape_at(level, around[r]);
+    double wanted = girth_at(b, level);
+    double size = fit_section(around[r], none, outside, wanted, s->fascia[r]);
+    if (!(size > 0.022)) {
+      sonde_free(around);
       return sonde_fail(error, SONDE_ARGUMENT,
                         "the skin's girth at level %.2f is %.0f mm: fat and skin leave a fascia of "
-                        "%.0f mm radius, expected 20 or more",
+                        "%.0f mm radius, expected 22 or more",
                         level, wanted * 1e3, size * 1e3);
-    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) s->fascia[r][c] = size * around[c];
-  }
-  // Centres: from the bone's place in the section; in front of the hip the fascia keeps its
-  // distance from the joint whatever the girth.
-  for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
-    double level = LIMB_TOP + r * LIMB_STEP, knots[SONDE_COUNT_OF(CENTRES)][3];
-    double size = level <= 1 ? limb->scale : b->calf_length_m / 0.395;
-    for (size_t k = 0; k < SONDE_COUNT_OF(CENTRES); ++k) {
-      double a = CENTRES[k][1] * SONDE_PI / 180, at = CENTRES[k][0];
-      double radius = limb_fascia_radius(limb, at, a), f = CENTRES[k][2] * radius;
-      knots[k][0] = at;
-      knots[k][1] = 1e-3 * size * CENTRES[k][3] - f * sin(a);
-      knots[k][2] = 1e-3 * size * CENTRES[k][4] - f * cos(a);
-      if (at <= 0) knots[k][2] = 0.062 * limb->scale - limb_fascia_radius(limb, at, 0.25);
     }
-    s->x[r] = THROUGH(knots, 1, level), s->y[r] = THROUGH(knots, 2, level);
   }
+  // Centres from the bones' places in the sections; in front of the hip the fascia keeps its
+  // distance from the joint whatever the girth.
+  double knots[SONDE_COUNT_OF(CENTRES)][3];
+  for (size_t k = 0; k < SONDE_COUNT_OF(CENTRES); ++k) {
+    double a = CENTRES[k][1] * SONDE_PI / 180, at = CENTRES[k][0];
+    double f = CENTRES[k][2] * limb_fascia_radius(limb, at, a);
+    sonde_vec3 bone = at <= 0  ? vec3(0, 0, 0)
+                      : at < 1 ? limb_shaft_axis(b, at)
+                               : limb_tibia_axis(b, at);
+    knots[k][0] = at, knots[k][1] = bone.x - f * sin(a), knots[k][2] = bone.y - f * cos(a);
+    if (at <= 0) knots[k][2] = 0.062 * limb->scale - limb_fascia_radius(limb, at, 0.25);
+  }
+  // The fascia passes outside the bones; the girth stays.
+  for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
+    double level = LIMB_TOP + r * LIMB_STEP, bone[LIMB_ANGLES];
+    s->x[r] = KNOTS(knots, 1, level), s->y[r] = KNOTS(knots, 2, level);
+    sonde_vec3 centre = vec3(s->x[r], s->y[r], limb_z(limb, level));
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+      double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
+      bone[c] = bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], 0.0012);
+      outside[c] = s->fat[r][c] + b->skin_m;
+    }
+    fit_section(around[r], bone, outside, girth_at(b, level), s->fascia[r]);
+    recentre(&s->x[r], &s->y[r], s->fascia[r]);
+  }
+  sonde_free(around);
   return SONDE_OK;
 }

@@ -1,0 +1,353 @@
+// Muscles of each section by a power diagram whose weights give every cell its area
+// (docs/limb_theory.md, Muscles).
+#include "limb/muscles.h"
+
+#include "limb/knots.h"
+#include "limb/vessels.h"
+
+#include <string.h>
+
+static const double LEAST_AREA = 14e-6; // a belly of less is a tendon
+static const double MOST_SCALE = 1.5;   // muscle against its rule; fat takes what is left
+
+// Fat between the muscles: which share of the section it takes at levels, and where.
+typedef struct filler {
+  const char *name;
+  double share[8][2];
+  uint32_t seeds;
+  limb_seed_knot knot[3];
+} filler;
+
+static const filler FILLERS[LIMB_FILLERS] = {
+    {"fat of the femoral triangle",
+     {{-0.2, 0.02},
+      {-0.05, 0.03},
+      {0.05, 0.035},
+      {0.15, 0.025},
+      {0.25, 0.01},
+      {0.45, 0.004},
+      {0.6, 0},
+      {3, 0}},
+     2,
+     {{-0.2, {{20, 0.8}, {40, 0.8}}},
+      {0.1, {{22, 0.82}, {35, 0.75}}},
+      {0.4, {{45, 0.66}, {55, 0.62}}}}},
+    {"contents of the pelvis and perineum, subgluteal fat",
+     {{-0.2, 0.36},
+      {-0.1, 0.25},
+      {0, 0.14},
+      {0.06, 0.09},
+      {0.12, 0.05},
+      {0.18, 0.02},
+      {0.24, 0},
+      {5, 0}},
+     3,
+     {{-0.2, {{95, 0.6}, {65, 0.6}, {130, 0.7}}},
+      {0, {{100, 0.8}, {85, 0.85}, {150, 0.7}}},
+      {0.12, {{150, 0.5}, {170, 0.45}, {200, 0.42}}}}},
+    {"popliteal fat",
+     {{0.55, 0},
+      {0.68, 0.03},
+      {0.8, 0.1},
+      {0.9, 0.2},
+      {1, 0.2},
+      {1.07, 0.1},
+      {1.15, 0.02},
+      {1.25, 0}},
+     2,
+     {{0.6, {{182, 0.5}, {195, 0.5}}},
+      {0.9, {{180, 0.62}, {195, 0.62}}},
+      {1.1, {{180, 0.6}, {192, 0.58}}}}},
+    {"joint and fat pads of the knee",
+     {{0.78, 0},
+      {0.86, 0.03},
+      {0.93, 0.16},
+      {1, 0.36},
+      {1.05, 0.3},
+      {1.1, 0.1},
+      {1.16, 0.01},
+      {1.2, 0}},
+     4,
+     {{0.85, {{355, 0.65}, {5, 0.68}, {0, 0.6}, {350, 0.6}}},
+      {0.95, {{0, 0.75}, {80, 0.85}, {280, 0.85}, {25, 0.8}}},
+      {1.1, {{5, 0.8}, {90, 0.85}, {275, 0.85}, {340, 0.85}}}}},
+    {"fat before the Achilles tendon",
+     {{1.5, 0},
+      {1.62, 0.04},
+      {1.75, 0.12},
+      {1.85, 0.22},
+      {1.95, 0.36},
+      {2, 0.42},
+      {3, 0.42},
+      {4, 0.42}},
+     2,
+     {{1.5, {{165, 0.8}, {195, 0.8}}},
+      {1.75, {{185, 0.78}, {160, 0.8}}},
+      {2, {{178, 0.6}, {200, 0.65}}}}}};
+
+limb_compartment limb_cell_compartment(uint32_t cell) {
+  SONDE_ASSERT(cell < LIMB_CELLS);
+  return cell < SONDE_LIMB_MUSCLES ? limb_muscle_table[cell].compartment : LIMB_FILLING;
+}
+
+double limb_muscle_area(const sonde_limb_body *b, uint32_t muscle, double level) {
+  SONDE_ASSERT(muscle < SONDE_LIMB_MUSCLES);
+  const limb_muscle *m = &limb_muscle_table[muscle];
+  double factor = limb_muscle_rule(b) * b->share[muscle];
+  if (m->volume_cm3 <= 0) // areas of a leg of 430 mm of thigh
+    return factor * KNOTS(m->area, 1, level) * 1e-6 * 0.430 / b->thigh_length_m;
+  double u = (level - m->from) / (m->to - m->from);
+  if (u <= 0 || u >= 1) return 0;
+  double a = m->spread * (m->peak - m->from) / (m->to - m->from), c = m->spread - a;
+  double length = (m->to - m->from) * (m->peak < 1 ? b->thigh_length_m : b->calf_length_m);
+  double beta = exp(lgamma(a + 1) + lgamma(c + 1) - lgamma(a + c + 2));
+  return factor * m->volume_cm3 * 1e-6 / (length * beta) * pow(u, a) * pow(1 - u, c);
+}
+
+// Adds the seeds of a cell in a row: polar places between two knots, x and y in mean radii.
+static void place_seeds(const sonde_limb *limb, double level, const limb_seed_knot *knot,
+                        uint32_t knots, uint32_t seeds, uint32_t row, uint32_t at) {
+  struct limb_muscles *m = limb->muscles;
+  SONDE_ASSERT(knots >= 1 && at + seeds <= LIMB_SEEDS);
+  uint32_t i = 0;
+  while (i + 2 < knots && knot[i + 1].level < level) ++i;
+  const limb_seed_knot *a = &knot[i], *b = knots > 1 ? a + 1 : a;
+  double u = b->level > a->level ? clamp((level - a->level) / (b->level - a->level), 0, 1) : 0;
+  for (uint32_t s = 0; s < seeds; ++s) {
+    double from = a->place[s][0] * SONDE_PI / 180, to = b->place[s][0] * SONDE_PI / 180;
+    double fx = (1 - u) * a->place[s][1] * sin(from) + u * b->place[s][1] * sin(to);
+    double fy = (1 - u) * a->place[s][1] * cos(from) + u * b->place[s][1] * cos(to);
+    double angle = atan2(fx, fy);
+    double r = limb_fascia_radius(limb, level, angle) / m->radius[row];
+    m->seed[row][at + s].x = (float)(r * fx), m->seed[row][at + s].y = (float)(r * fy);
+  }
+}
+
+enum { SAMPLES = 2400 };
+
+typedef struct section {
+  uint32_t count;
+  float x[SAMPLES], y[SAMPLES]; // in mean radii
+  double spacing, cell_area;    // in mean radii
+} section;
+
+// Points of a square grid within the fascia and outside bones and vessels.
+static void sample_section(const sonde_limb *limb, double level, double radius, section *s) {
+  sonde_vec3 c = limb_centre(limb, level);
+  s->count = 0, s->spacing = 0.082, s->cell_area = s->spacing * s->spacing;
+  for (double y = -1.7; y < 1.7; y += s->spacing)
+    for (double x = -1.7; x < 1.7; x += s->spacing) {
+      double r = radius * sqrt(x * x + y * y);
+      if (r > limb_fascia_radius(limb, level, atan2(x, y))) continue;
+      const double p[3] = {c.x + radius * x, c.y + radius * y, c.z};
+      if (limb_bone_distance(limb, p, NULL) < 0) continue;
+      if (limb->vessels && limb_vessels_at(limb->vessels, p).part != LIMB_PART_NONE) continue;
+      SONDE_ASSERT(s->count < SAMPLES);
+      s->x[s->count] = (float)x, s->y[s->count++] = (float)y;
+    }
+}
+
+// Area of every cell in mean radii squared. A sample at a boundary counts for both sides by its
+// distance to it. `least` gets how much nearer a cell would have to be to own any sample.
+static void measure_cells(const struct limb_muscles *m, uint32_t row, const section *s,
+                          double *area, double *least) {
+  memset(area, 0, LIMB_CELLS * sizeof *area);
+  for (uint32_t k = 0; k < LIMB_CELLS; ++k) least[k] = INFINITY;
+  const limb_seed *seed = m->seed[row];
+  for (uint32_t i = 0; i < s->count; ++i) {
+    float best[LIMB_CELLS];
+    uint32_t at[LIMB_CELLS], first = 0, second = 0;
+    for (uint32_t k = 0; k < LIMB_CELLS; ++k) best[k] = 1e30F, at[k] = 0;
+    for (uint32_t k = 0; k < m->seed_count; ++k) {
+      float dx = s->x[i] - seed[k].x, dy = s->y[i] - seed[k].y;
+      float d = dx * dx + dy * dy - seed[k].weight;
+      uint32_t cell = m->cell_of[k];
+      if (d < best[cell]) best[cell] = d, at[cell] = k;
+    }
+    float d1 = 1e30F, d2 = 1e30F;
+    for (uint32_t k = 0; k < LIMB_CELLS; ++k) {
+      if (best[k] < d1)
+        d2 = d1, second = first, d1 = best[k], first = k;
+      else if (best[k] < d2)
+        d2 = best[k], second = k;
+    }
+    for (uint32_t k = 0; k < LIMB_CELLS; ++k) {
+      double nearer = k == first ? 0 : best[k] - d1;
+      if (nearer < least[k]) least[k] = nearer;
+    }
+    const limb_seed *a = &seed[at[first]], *b = &seed[at[second]];
+    double apart = hypot(a->x - b->x, a->y - b->y) + 1e-6;
+    double part = fmin(1, 0.5 + 0.5 * (d2 - d1) / apart / s->spacing);
+    area[first] += part * s->cell_area, area[second] += (1 - part) * s->cell_area;
+  }
+}
+
+static void set_weight(struct limb_muscles *m, uint32_t row, uint32_t cell, double by) {
+  for (uint32_t k = 0; k < m->seed_count; ++k)
+    if (m->cell_of[k] == cell) m->seed[row][k].weight += (float)by;
+}
+
+// Weights that give each cell its target: damped steps, each cell by its own error; an absent cell
+// keeps the greatest weight at which it owns nothing.
+static void solve_row(struct limb_muscles *m, uint32_t row, const section *s) {
+  double unit = m->radius[row] * m->radius[row], area[LIMB_CELLS], least[LIMB_CELLS];
+  double gain[LIMB_CELLS], before[LIMB_CELLS] = {0};
+  for (uint32_t k = 0; k < LIMB_CELLS; ++k) gain[k] = 0.45;
+  for (uint32_t pass = 0; pass < 70; ++pass) {
+    measure_cells(m, row, s, area, least);
+    double worst = 0;
+    for (uint32_t k = 0; k < LIMB_CELLS; ++k) {
+      double wanted = m->target[row][k] / unit, error = wanted - area[k];
+      if (wanted <= 0) {
+        // Absent: just out of every sample's reach.
+        set_weight(m, row, k, area[k] > 0 ? -0.03 - 0.5 * area[k] : fmin(least[k] - 0.02, 0.1));
+        worst = fmax(worst, area[k] > 0 ? area[k] / 0.004 * 0.02 : 0);
+        continue;
+      }
+      if (area[k] <= 0) {
+        set_weight(m, row, k, least[k] + 0.004);
+        worst = 1;
+        continue;
+      }
+      // The step shrinks when the error changes its sign and grows while it does not.
+      gain[k] = fmin(fmax(gain[k] * (error * before[k] < 0 ? 0.5 : 1.15), 0.08), 1.2);
+      before[k] = error;
+      set_weight(m, row, k, clamp(gain[k] * error, -0.08, 0.08));
+      worst = fmax(worst, fabs(error) / (wanted + 0.004));
+    }
+    if (worst < 0.008) break;
+  }
+  measure_cells(m, row, s, area, least);
+  for (uint32_t k = 0; k < LIMB_CELLS; ++k) m->area[row][k] = area[k] * unit;
+}
+
+// Areas of a row: muscles by their rule times a common scale, fat for its share and for what muscle
+// does not fill.
+static void set_targets(const sonde_limb *limb, uint32_t row, double level, double room) {
+  struct limb_muscles *m = limb->muscles;
+  double muscle = 0, share[LIMB_FILLERS], fat = 0;
+  for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) {
+    double area = limb_muscle_area(&limb->body, k, level);
+    m->target[row][k] = area < LEAST_AREA ? 0 : area;
+    muscle += m->target[row][k];
+  }
+  for (uint32_t k = 0; k < LIMB_FILLERS; ++k) {
+    share[k] = KNOTS(FILLERS[k].share, 1, level);
+    if (share[k] < 0.003) share[k] = 0;
+    fat += share[k];
+  }
+  double scale = muscle > 0 ? (1 - fat) * room / muscle : 1;
+  double elastic = fat - share[0]; // the fat of the femoral triangle keeps its share
+  if (elastic > 0 && scale > MOST_SCALE) {
+    double more = ((1 - share[0]) * room - MOST_SCALE * muscle) / (elastic * room);
+    for (uint32_t k = 1; k < LIMB_FILLERS; ++k) share[k] *= more;
+    scale = MOST_SCALE;
+  }
+  m->scale[row] = scale;
+  for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) m->target[row][k] *= scale;
+  for (uint32_t k = 0; k < LIMB_FILLERS; ++k)
+    m->target[row][SONDE_LIMB_MUSCLES + k] = share[k] * room;
+}
+
+sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
+  SONDE_ASSERT(limb && limb->bones && !limb->muscles);
+  struct limb_muscles *m = limb->muscles = SONDE_NEW(struct limb_muscles, 1);
+  section *s = SONDE_NEW(section, 1);
+  if (!m || !s) {
+    sonde_free(s);
+    return sonde_fail_memory(error);
+  }
+  for (uint32_t c = 0; c < LIMB_CELLS; ++c) {
+    uint32_t seeds =
+        c < SONDE_LIMB_MUSCLES ? limb_muscle_table[c].seeds : FILLERS[c - SONDE_LIMB_MUSCLES].seeds;
+    for (uint32_t k = 0; k < seeds; ++k) m->cell_of[m->seed_count++] = (uint8_t)c;
+    SONDE_ASSERT(seeds >= 1 && m->seed_count <= LIMB_SEEDS);
+  }
+  for (uint32_t row = 0; row < LIMB_CELL_ROWS; ++row) {
+    double level = LIMB_TOP + row * LIMB_CELL_STEP, mean = 0;
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c)
+      mean += limb_fascia_radius(limb, level, 2 * SONDE_PI * c / LIMB_ANGLES) / LIMB_ANGLES;
+    m->radius[row] = mean;
+    uint32_t at = 0;
+    for (uint32_t c = 0; c < SONDE_LIMB_MUSCLES; at += limb_muscle_table[c++].seeds) {
+      const limb_muscle *muscle = &limb_muscle_table[c];
+      uint32_t knots = 1;
+      while (knots < LIMB_SEED_KNOTS && muscle->knot[knots].place[0][1] > 0) ++knots;
+      place_seeds(limb, level, muscle->knot, knots, muscle->seeds, row, at);
+    }
+    for (uint32_t c = 0; c < LIMB_FILLERS; at += FILLERS[c++].seeds)
+      place_seeds(limb, level, FILLERS[c].knot, 3, FILLERS[c].seeds, row, at);
+    // Weights begin at those of the row above.
+    for (uint32_t k = 0; row && k < m->seed_count; ++k)
+      m->seed[row][k].weight = m->seed[row - 1][k].weight;
+    sample_section(limb, level, mean, s);
+    set_targets(limb, row, level, s->count * s->cell_area * mean * mean);
+    solve_row(m, row, s);
+  }
+  for (uint32_t row = 0; row + 1 < LIMB_CELL_ROWS; ++row)
+    for (uint32_t k = 0; k < m->seed_count; ++k) {
+      uint32_t c = m->cell_of[k];
+      if (m->target[row][c] > 0 || m->target[row + 1][c] > 0)
+        m->active[row][m->active_count[row]++] = (uint8_t)k;
+    }
+  sonde_free(s);
+  return SONDE_OK;
+}
+
+limb_cell limb_cell_at(const sonde_limb *limb, double level, double x, double y) {
+  const struct limb_muscles *m = limb->muscles;
+  SONDE_ASSERT(m);
+  double at = clamp((level - LIMB_TOP) / LIMB_CELL_STEP, 0, LIMB_CELL_ROWS - 1.000001);
+  uint32_t row = (uint32_t)at;
+  float u = (float)(at - row), v = 1 - u;
+  double radius = v * m->radius[row] + u * m->radius[row + 1];
+  float px = (float)(x / radius), py = (float)(y / radius), d1 = 1e30F, d2 = 1e30F;
+  uint32_t first = 0, second = 0;
+  const limb_seed *a = m->seed[row], *b = m->seed[row + 1];
+  for (uint32_t i = 0; i < m->active_count[row]; ++i) {
+    uint32_t k = m->active[row][i];
+    float dx = px - (v * a[k].x + u * b[k].x), dy = py - (v * a[k].y + u * b[k].y);
+    float d = dx * dx + dy * dy - (v * a[k].weight + u * b[k].weight);
+    if (d < d1) {
+      if (m->cell_of[k] != m->cell_of[first]) d2 = d1, second = first;
+      d1 = d, first = k;
+    } else if (d < d2 && m->cell_of[k] != m->cell_of[first]) {
+      d2 = d, second = k;
+    }
+  }
+  double sx = v * (a[first].x - a[second].x) + u * (b[first].x - b[second].x);
+  double sy = v * (a[first].y - a[second].y) + u * (b[first].y - b[second].y);
+  double boundary = d2 < 1e29F ? 0.5 * (d2 - d1) / (hypot(sx, sy) + 1e-6) * radius : INFINITY;
+  return (limb_cell){m->cell_of[first], m->cell_of[second], boundary, first, row};
+}
+
+sonde_vec3 limb_fibre(const sonde_limb *limb, const limb_cell *cell, sonde_vec3 p) {
+  const struct limb_muscles *m = limb->muscles;
+  SONDE_ASSERT(m && cell->cell < SONDE_LIMB_MUSCLES);
+  const limb_muscle *muscle = &limb_muscle_table[cell->cell];
+  // Axis of the belly: from the seed in this row to the seed in the next.
+  double level = LIMB_TOP + cell->row * LIMB_CELL_STEP, next = level + LIMB_CELL_STEP;
+  const limb_seed *a = &m->seed[cell->row][cell->seed], *b = &m->seed[cell->row + 1][cell->seed];
+  sonde_vec3 from = limb_centre(limb, level), to = limb_centre(limb, next);
+  double ra = m->radius[cell->row], rb = m->radius[cell->row + 1];
+  from.x += ra * a->x, from.y += ra * a->y, to.x += rb * b->x, to.y += rb * b->y;
+  sonde_vec3 axis = v_unit(v_sub(to, from), vec3(0, 0, -1));
+  // Tilt by the pennation towards the sheet that the fibres end on.
+  sonde_vec3 centre = limb_centre(limb, limb_level(limb, p.z));
+  sonde_vec3 out = v_unit(vec3(p.x - centre.x, p.y - centre.y, 0), vec3(0, 1, 0));
+  double side = 1;
+  if (muscle->pennate == LIMB_CENTRAL) {
+    sonde_vec3 across = vec3(out.y, -out.x, 0);
+    double u = (p.z - from.z) / (to.z - from.z);
+    sonde_vec3 middle = v_lerp(from, to, u);
+    side = v_dot(v_sub(p, middle), across) > 0 ? -1 : 1;
+    out = across;
+  } else if (muscle->pennate == LIMB_INWARD) {
+    side = -1;
+  } else if (muscle->pennate == LIMB_STRAP) {
+    return axis;
+  }
+  sonde_vec3 tilt = v_unit(v_madd(out, -v_dot(out, axis), axis), out);
+  double pennation = muscle->pennation_deg * SONDE_PI / 180;
+  return v_add(v_scale(axis, cos(pennation)), v_scale(tilt, side * sin(pennation)));
+}
