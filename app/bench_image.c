@@ -51,7 +51,7 @@ static const app_option TABLE[] = {
     OPT_JSON(json)};
 
 static void draw(bench *b, uint64_t tick) {
-  settled_update(&b->scene, &b->pathology, tick);
+  settled_update(&b->scene, &b->pathology, 0, tick);
   sonde_echo_render(b->echo, b->scene.pose, 2 * b->scene.probe.half_x_m, &b->pathology,
                     &b->settings, &b->image);
 }

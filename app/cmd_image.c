@@ -180,7 +180,7 @@ static int run(void *from) {
     sonde_echo_def def = sonde_echo_def_default();
     def.seed = (uint64_t)o->seed;
     double aperture = isnan(o->aperture_m) ? 2 * s.probe.half_x_m : o->aperture_m;
-    settled_update(&s, &pathology, sonde_state_tick(s.state));
+    settled_update(&s, &pathology, 0, sonde_state_tick(s.state));
     status = sonde_echo_check_view(aperture, isnan(o->radius_m) ? 0 : o->radius_m, &error);
     if (!status) status = sonde_echo_create(s.interior, &def, &echo, &error);
     if (!status) status = sonde_echo_set_radius(echo, isnan(o->radius_m) ? 0 : o->radius_m, &error);

@@ -7,12 +7,13 @@
 #include <stdio.h>
 
 static const double PA_PER_MMHG = 133.322387415;
+static const double CUFF_MOST_PA = 300 * 133.322387415, CLOSED = 0.05, CUFF_LIFT_M = 0.005;
 
 typedef struct options {
   const char *model, *probe, *pathology, *image, *preset;
   long site;
   double force_n, depth_m; // NaN when not asked for, as all below
-  double vein_depth_m, venous_pa, thrombus_pa, wall_pa;
+  double cuff_pa, vein_depth_m, venous_pa, thrombus_pa, wall_pa, sheath;
   bool json;
 } options;
 
@@ -20,10 +21,12 @@ static const options DEFAULTS = {.probe = "linear",
                                  .pathology = "healthy",
                                  .force_n = NAN,
                                  .depth_m = NAN,
+                                 .cuff_pa = NAN,
                                  .vein_depth_m = NAN,
                                  .venous_pa = NAN,
                                  .thrombus_pa = NAN,
-                                 .wall_pa = NAN};
+                                 .wall_pa = NAN,
+                                 .sheath = NAN};
 
 static const app_option TABLE[] = {
     OPT_MODEL(model),
@@ -32,6 +35,9 @@ static const app_option TABLE[] = {
              "point, linear, square, sphere, or a mesh file in millimetres"),
     OPT_REAL(force_n, "force-n", "F", 0.01, 200, 1, "press until the settled force is F newtons"),
     OPT_REAL(depth_m, "depth-mm", "D", -10, 60, 1e-3, "press D millimetres below the rest skin"),
+    OPT_REAL(cuff_pa, "cuff-mmhg", "P", 0, 300, PA_PER_MMHG,
+             "no probe: a cuff around the leg presses P on every vessel; also finds the pressure "
+             "that closes the vein to 5 % of its area at rest"),
     OPT_TEXT(pathology, "case", "NAME",
              "healthy, partial_mural, acute_occlusive, subacute_occlusive or chronic_occlusive"),
     OPT_REAL(vein_depth_m, "vein-depth-mm", "D", 8, 50, 1e-3,
@@ -41,6 +47,8 @@ static const app_option TABLE[] = {
              "fill the vein with a clot of this shear modulus"),
     OPT_REAL(wall_pa, "wall-kpa", "W", 10, 300, 1e3,
              "shear modulus of the vein's wall; default 30"),
+    OPT_REAL(sheath, "sheath", "S", 0, 1, 1,
+             "how firmly the sheath ties the vessels' walls to the muscle: 0 loose, 1 glued"),
     OPT_TEXT(preset, "preset", "FILE",
              "damping, stiffness and friction, see sonde-identify(1); a settled probe feels the "
              "stiffness only"),
@@ -53,6 +61,7 @@ typedef struct press {
   sonde_pose start; // at rest on the site
   sonde_pathology pathology;
   double vein_depth_m;          // NaN: where the model has it
+  double closes_pa;             // cuff that closes the vein; NaN: none does, or no cuff
   sonde_vessel_state vessel[2]; // vein, artery
   bool cut[2];                  // the image plane meets it
 } press;
@@ -86,6 +95,10 @@ static void print(const press *p, const options *o) {
              s->depth_m * 1e3, s->result.reaction_n, s->result.contact_n);
     print_vessel("vein", &p->vessel[0], p->cut[0]);
     print_vessel("artery", &p->vessel[1], p->cut[1]);
+    if (!isnan(o->cuff_pa)) {
+      app_json_real("cuff_mmhg", o->cuff_pa / PA_PER_MMHG);
+      app_json_real("vein_closes_mmhg", p->closes_pa / PA_PER_MMHG);
+    }
     app_json("vein_short_mm:%g residual:%g steps:%u",
              p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN, s->result.residual, s->iterations);
     settled_json_jumps(s);
@@ -104,14 +117,38 @@ static void print(const press *p, const options *o) {
     printf("vein area     %8.1f %% of rest, %.1f mm front to back (%.2f of rest)\n",
            p->vessel[0].area_ratio * 100, p->vessel[0].half_short_m * 2e3,
            p->vessel[0].half_short_m / p->vessel[0].rest_radius_m);
+  if (p->cut[0] && !isnan(o->cuff_pa)) {
+    if (isnan(p->closes_pa))
+      printf("closes        not up to %.0f mmHg\n", CUFF_MOST_PA / PA_PER_MMHG);
+    else
+      printf("closes        at a cuff of %.1f mmHg\n", p->closes_pa / PA_PER_MMHG);
+  }
   if (p->cut[1]) printf("artery area   %8.1f %% of rest\n", p->vessel[1].area_ratio * 100);
   if (o->image) printf("image         %s\n", o->image);
 }
 
+// The cuff at which the vein's area has fallen to 5 % of that at rest, by bisection; NaN: none.
+static double find_closing_cuff(const press *p) {
+  sonde_vessel_state v;
+  double low = 0, high = CUFF_MOST_PA;
+  for (int k = 0; k < 20; ++k) {
+    double middle = k > 0 ? 0.5 * (low + high) : high;
+    settled_update(&p->scene, &p->pathology, middle, sonde_state_tick(p->scene.state));
+    if (!sonde_interior_vessel_at_plane(p->scene.interior, 0, p->scene.pose, &v)) return NAN;
+    if (k == 0 && v.area_ratio > CLOSED) return NAN;
+    if (v.area_ratio > CLOSED)
+      low = middle;
+    else
+      high = middle;
+  }
+  return high;
+}
+
 static int run(void *from) {
   const options *o = from;
-  assert(isnan(o->force_n) != isnan(o->depth_m));
-  press p = {.vein_depth_m = o->vein_depth_m};
+  const bool cuff = !isnan(o->cuff_pa);
+  assert(cuff + !isnan(o->force_n) + !isnan(o->depth_m) == 1);
+  press p = {.vein_depth_m = o->vein_depth_m, .closes_pa = NAN};
   sonde_pathology *vein = &p.pathology;
   sonde_error error = {0};
   sonde_preset preset = sonde_preset_default();
@@ -122,6 +159,7 @@ static int run(void *from) {
   // material is incompressible.
   if (!isnan(o->venous_pa)) vein->venous_pressure_pa = o->venous_pa;
   if (!isnan(o->wall_pa)) vein->wall_shear_pa = o->wall_pa;
+  if (!isnan(o->sheath)) vein->sheath = o->sheath;
   if (!isnan(o->thrombus_pa)) {
     vein->thrombus_fraction = 1;
     vein->thrombus_modulus_pa = 3 * o->thrombus_pa;
@@ -129,13 +167,14 @@ static int run(void *from) {
 
   // A model without a bone can be pressed, unless vessels or a picture are asked for.
   bool vessels = o->image || !isnan(o->vein_depth_m) || !isnan(o->venous_pa) ||
-                 !isnan(o->wall_pa) || !isnan(o->thrombus_pa);
+                 !isnan(o->wall_pa) || !isnan(o->thrombus_pa) || !isnan(o->sheath) || cuff;
   app_progress_begin("pressing");
   if (!status) status = settled_open(&p.scene, o->model, o->probe, &preset, vessels, &error);
   if (!status) status = settled_site(&p.scene, o->model, o->site, &p.start, &error);
   if (!status) {
+    double depth_m = cuff ? -CUFF_LIFT_M : o->depth_m;
     status = !isnan(o->force_n) ? settled_force(&p.scene, p.start, o->force_n, &error)
-                                : settled_press(&p.scene, p.start, o->depth_m, INFINITY, &error);
+                                : settled_press(&p.scene, p.start, depth_m, INFINITY, &error);
     settled_warn(&p.scene, "press");
   }
   if (!status && p.scene.interior) { // a model with a bone
@@ -145,7 +184,9 @@ static int run(void *from) {
       status =
           sonde_interior_set_vein_depth(p.scene.interior, p.start.position, p.vein_depth_m, &error);
     if (!status) {
-      settled_update(&p.scene, &p.pathology, sonde_state_tick(p.scene.state));
+      if (cuff) p.closes_pa = find_closing_cuff(&p);
+      settled_update(&p.scene, &p.pathology, cuff ? o->cuff_pa : 0,
+                     sonde_state_tick(p.scene.state));
       for (int which = 0; which < 2; ++which)
         p.cut[which] =
             sonde_interior_vessel_at_plane(p.scene.interior, which, p.scene.pose, &p.vessel[which]);
@@ -172,12 +213,13 @@ static int run(void *from) {
 const app_command cmd_press = {
     .verb = "press",
     .summary = "press once, settle, report force, penetration and vessels",
-    .usage = "[MODEL] --site K --probe NAME|FILE (--force-n F | --depth-mm D) [options]",
+    .usage =
+        "[MODEL] --site K --probe NAME|FILE (--force-n F | --depth-mm D | --cuff-mmhg P) [options]",
     .text = "Presses a probe on the thigh until everything is at rest and reports the force, the "
             "penetration and the state of the vein and the artery below it.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .defaults = &DEFAULTS,
     .required = "site",
-    .one_of = "force-n depth-mm",
+    .one_of = "force-n depth-mm cuff-mmhg",
     .run = run};

@@ -25,7 +25,7 @@ sonde_status press_picture(const press_options *o, sonde_image *image, uint8_t *
   // At rest: the picture is shifted so that its vein lies on the model's.
   press.interior = scene.interior;
   scene.pose = press.rest_pose;
-  settled_update(&scene, &pathology, sonde_state_tick(scene.state));
+  settled_update(&scene, &pathology, 0, sonde_state_tick(scene.state));
   if (!isnan(o->vein_mm[0])) {
     if (!sonde_interior_vessel_at_plane(scene.interior, 0, press.rest_pose, &v)) {
       status = app_error(error, SONDE_MISMATCH, "--vein-at: the model's vein is not under site %ld",
@@ -43,7 +43,7 @@ sonde_status press_picture(const press_options *o, sonde_image *image, uint8_t *
   settled_warn(&scene, "slice");
   if (!status) status = sonde_image_create(image->width, image->height, &out, error);
   if (status) goto done;
-  settled_update(&scene, &pathology, sonde_state_tick(scene.state));
+  settled_update(&scene, &pathology, 0, sonde_state_tick(scene.state));
   out.width_m = image->width_m, out.height_m = image->height_m;
   press.pose = scene.pose;
   sonde_image_pressed(image, &press, &out, known);

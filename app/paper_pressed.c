@@ -127,7 +127,7 @@ static sonde_status draw_pressed(paper *p, settled *s, const sonde_pathology *ve
   sonde_echo *echo = NULL;
   sonde_file *file = NULL;
   sonde_echo_settings settings = sonde_echo_settings_default();
-  settled_update(s, vein, sonde_state_tick(s->state));
+  settled_update(s, vein, 0, sonde_state_tick(s->state));
   sonde_status status = sonde_echo_create(s->interior, NULL, &echo, error);
   if (!status) status = sonde_image_create(SIDE, SIDE, &image, error);
   if (!status) sonde_echo_render(echo, s->pose, 2 * s->probe.half_x_m, vein, &settings, &image);
@@ -177,7 +177,7 @@ static sonde_status judge_vein(paper *p, settled *s, sonde_error *error) {
     sonde_pathology state;
     status = sonde_pathology_preset(STATE[k], &state, error);
     if (status) break;
-    settled_update(s, &state, sonde_state_tick(s->state));
+    settled_update(s, &state, 0, sonde_state_tick(s->state));
     area[k] = vessel_ratio(s, 0);
     if (k == 0) artery = vessel_ratio(s, 1);
   }

@@ -54,7 +54,8 @@ static sonde_status time_press(const paper *p, times *t, sonde_error *error) {
                                        0.01,
                                        k,
                                        s.probe.half_x_m,
-                                       s.probe.half_y_m};
+                                       s.probe.half_y_m,
+                                       0};
     double *best_s = &t->frame_s[k / every];
     *best_s = INFINITY; // of three: other work on the machine slows single ones
     for (int repeat = 0; repeat < 3; ++repeat) {

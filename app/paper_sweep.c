@@ -32,7 +32,7 @@ static sonde_status make_sweep(const paper *p, uint32_t count, sonde_sequence *s
   sonde_pose start = sonde_site_pose(p->central, WITHIN_M);
   for (uint32_t k = 0; k < count && !status; ++k) {
     s.pose = pose_shift(start, SPACING_M * (k - 0.5 * (count - 1)), p->central->v);
-    settled_update(&s, &vein, 0);
+    settled_update(&s, &vein, 0, 0);
     sonde_echo_render(echo, s.pose, APERTURE_M, &vein, &settings, &image);
     memcpy(sweep->pixels + (size_t)k * SIDE * SIDE, image.pixels, (size_t)SIDE * SIDE);
     sweep->frames[k].world_from_pixel = sonde_slice_plane(s.pose, &image);

@@ -40,7 +40,8 @@ sonde_status settled_force(settled *s, sonde_pose start, double force_n, sonde_e
 // Says on stderr where the last press met a jump of the skin; the same as a list in the JSON.
 void settled_warn(const settled *s, const char *verb);
 void settled_json_jumps(const settled *s);
-// The interior at the settled state.
-void settled_update(const settled *s, const sonde_pathology *pathology, uint64_t tick);
+// The interior at the settled state, in a cuff of that pressure (0: none).
+void settled_update(const settled *s, const sonde_pathology *pathology, double cuff_pa,
+                    uint64_t tick);
 
 #endif

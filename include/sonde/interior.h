@@ -41,6 +41,9 @@ typedef struct sonde_pathology {
   double lumen_scale;                    /**< rest radius relative to the healthy vein */
   double echogenicity;  /**< backscatter of the thrombus relative to muscle, 0..1 */
   double wall_shear_pa; /**< shear modulus of the vein's wall; 0: 30 kPa */
+  /** How firmly the sheath around the vessels ties their walls to the muscle: 0 loose, as in a leg,
+   * to 1 glued, as in the finite-element study (docs/interior_theory.md). */
+  double sheath;
 } sonde_pathology;
 
 /** Preset names, NULL-terminated: healthy, partial_mural, acute_occlusive, subacute_occlusive,
@@ -109,6 +112,7 @@ typedef struct sonde_interior_input {
    * face the vein would close otherwise). INFINITY: forces that no probe gave, as wide as they are.
    */
   double face_half_x_m, face_half_y_m;
+  double cuff_pa; /**< uniform pressure on every vessel from outside, beside the probe's */
 } sonde_interior_input;
 
 /** New surface state: solves the field, the stress at the vessels and their areas.

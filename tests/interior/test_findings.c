@@ -63,7 +63,7 @@ static void press(limb *l, double force_n, double dent_m) {
       moved[i] = v_madd(skin->vertices[i], -dent_m * w, vec3(0, 1, 0));
     }
   sonde_interior_update(
-      l->in, &(sonde_interior_input){moved, l->load, pose, &healthy, -1, 1, 0.03, 0.006});
+      l->in, &(sonde_interior_input){moved, l->load, pose, &healthy, -1, 1, 0.03, 0.006, 0});
   sonde_free(moved);
 }
 

@@ -109,6 +109,7 @@ static void press_row(area_row *row) {
   sonde_pathology p;
   assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
   p.wall_shear_pa = row->wall_pa;
+  p.sheath = 1; // the study's vessels are glued to the muscle
   if (row->venous_mmhg > 0) p.venous_pressure_pa = row->venous_mmhg * SONDE_PA_PER_MMHG;
   if (row->thrombus_pa > 0) {
     p.thrombus_fraction = 1;

@@ -2,6 +2,7 @@
 #include "exam/record.h"
 
 #include "base/base.h"
+#include "base/maths.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -33,7 +34,7 @@ void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
   bytes_u32(w, c->gel_wipe);
   bytes_u32(w, c->posture);
   bytes_u32(w, c->preset);
-  bytes_u32(w, 0);
+  bytes_f32(w, c->pathology.sheath);
   bytes_f64(w, c->stiffness_scale);
   bytes_f64(w, c->damping_scale);
   bytes_f64(w, c->friction_scale);
@@ -67,7 +68,7 @@ void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c)
     uint32_t posture = bytes_take_u32(r), preset = bytes_take_u32(r);
     c->posture = posture < SONDE_POSTURE_COUNT ? (sonde_posture)posture : SONDE_POSTURE_SUPINE;
     c->preset = preset < SONDE_SESSION_PRESETS ? preset : 0;
-    (void)bytes_take_u32(r);
+    c->pathology.sheath = clamp(bytes_take_f32(r), 0, 1);
     c->stiffness_scale = within(bytes_take_f64(r), 0.5, 2.0);
     c->damping_scale = within(bytes_take_f64(r), 0.25, 4.0);
     c->friction_scale = within(bytes_take_f64(r), 0.0, 2.0);

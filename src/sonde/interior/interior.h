@@ -67,7 +67,7 @@ typedef struct sonde_vessel_section {
   sonde_vec3 rest_m, axis;
   double s_m; // along the femur's axis, ascending
   double radius_m, depth_m;
-  double hold;     // shear modulus around it over that of muscle
+  bool in_fat;     // not between muscles
   double tissue_m; // from the skin to the bone
   double coupling; // of the tissue by its wall: 0 where it opens into another vessel, 1 beyond
 } sonde_vessel_section;
@@ -202,13 +202,13 @@ sonde_status sonde_sections_create(sonde_interior *interior, sonde_error *error)
 // Layer depths of the table again as the model gives them; windows have to be made again.
 void sonde_columns_refresh(sonde_interior *interior);
 
-// Area ratio of a vein in tissue `hold` times as stiff as muscle where it closes.
-double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, double hold);
+// Area ratio of a vein between muscles or in the fat.
+double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, bool in_fat);
 // Ellipse of a vein or artery with that area ratio: half axes over the rest radius.
 void sonde_vessel_shape(sonde_vessel_kind kind, const sonde_pathology *pathology, bool clot,
                         double ratio, double *half_short, double *half_long);
 // Radius of the vein at rest relative to the healthy one at 10 mmHg.
-double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot);
+double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot, bool in_fat);
 // Radius of the artery at its pressure relative to that at 95 mmHg.
 double sonde_artery_rest_scale(const sonde_pathology *pathology);
 // True where a thrombus lies.
@@ -220,7 +220,8 @@ double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa
 // Area of the artery relative to its rest area at an effective outside pressure (Pa). @thread any
 double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
 // Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
-// inside muscle, for a wall of that shear modulus (docs/interior_theory.md). Monotone. @thread any
+// glued to muscle, for a wall of that shear modulus (docs/interior_theory.md). Monotone. @thread
+// any
 double sonde_vein_tube_pressure(double area_ratio, double wall_shear_pa);
 // Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
 // incompressible half space: lateral x, axial y, normal z (docs/interior_theory.md, superposed

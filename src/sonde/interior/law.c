@@ -11,6 +11,17 @@ static const double artery_wall_pa = 150e3, artery_inner_share = 0.633;
 static const double least_area = 1e-6;             // of the artery under any pressure
 static const double artery_reference_pa = 12665.6; // 95 mmHg
 static const double reference_pa = 1333.22387415; // 10 mmHg: the pressure the model's radii hold at
+// Veins in a loose sheath, published figures (docs/interior_theory.md): area over that at 10 mmHg
+// when filled, when the walls touch, the pressure outside less that inside then, change of pressure
+// per relative area at 10 mmHg (compliance .031 per mmHg femoral, .012 saphenous) and near closing.
+static const double filled_area = 1.75, closed_area = 0.05, closing_pa = 10 * SONDE_PA_PER_MMHG;
+static const double deep_slope_pa = SONDE_PA_PER_MMHG / 0.031;
+static const double superficial_slope_pa = SONDE_PA_PER_MMHG / 0.012;
+static const double closing_slope_pa = 8 * SONDE_PA_PER_MMHG;
+// An artery in a loose sheath: pressure per relative diameter; it buckles around this pressure
+// below zero, over that range.
+static const double artery_modulus_pa = 150e3;
+static const double buckling_pa = 7 * SONDE_PA_PER_MMHG, buckling_width_pa = 3 * SONDE_PA_PER_MMHG;
 
 // Superposed stresses below the corners of four rectangles a x b (signed sides) at depth z.
 sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double half_y_m, double x_m,
@@ -44,51 +55,99 @@ static double ring_pressure(double a, double inner_share) {
   return sum * (inner - outer) / (3 * STEPS);
 }
 
-// Transmural pressure (Pa) of an open vein with area a over the stress-free one: the study's cubic
-// for a wall of 30 kPa, and the ring's difference for another wall. A wall that is squeezed flat
-// keeps its length and bends: 3 EI/r^3 is 50 Pa, nothing beside the muscle.
+// Transmural pressure (Pa) of an open vein that is glued to muscle, with area a over the
+// stress-free one: the study's cubic for a wall of 30 kPa, and the ring's difference for another
+// wall. A wall that is squeezed flat keeps its length and bends: 3 EI/r^3 is 50 Pa, nothing beside
+// the muscle.
 double sonde_vein_tube_pressure(double a, double wall_pa) {
   double cubic = 1e3 * (((1.688 * a - 5.746) * a + 12.547) * a - 8.248);
   double wall = wall_pa > 0 ? clamp(wall_pa, least_wall_pa, most_wall_pa) : study_wall_pa;
   return cubic + (wall - study_wall_pa) * ring_pressure(a, ring_inner_share);
 }
 
-// Area over the stress-free one: the pressure rises with the area; bracketed Newton. What resists
-// closing is the tissue around, which has to follow inwards: the negative pressures scale with its
-// modulus.
-static double open_area(double transmural_pa, double wall_pa, double hold) {
-  SONDE_ASSERT(isfinite(transmural_pa) && hold > 0);
+// Transmural pressure (Pa) of a vein in a loose sheath, with area a over that at 10 mmHg. Filled,
+// it approaches the area of standing; below 10 mmHg its walls come together at closing_pa below
+// zero, over a power that joins the slopes at rest and at closing.
+static double loose_pressure(double a, double slope_pa) {
+  SONDE_ASSERT(a > 0 && a < filled_area && slope_pa > closing_slope_pa);
+  if (a >= 1)
+    return reference_pa + slope_pa * (filled_area - 1) * log((filled_area - 1) / (filled_area - a));
+  double power = (slope_pa - closing_slope_pa) /
+                 (reference_pa + closing_pa - closing_slope_pa * (1 - closed_area));
+  return reference_pa + (slope_pa - closing_slope_pa) * (pow(a, power) - 1) / power +
+         closing_slope_pa * (a - 1);
+}
+
+// A vein's wall and what holds it; lengths of the areas: a over the area at 10 mmHg.
+typedef struct vein_wall {
+  double wall_pa, sheath, hold;
+  double slope_pa;   // of the loose vein's pressure at 10 mmHg
+  double glued_area; // of the glued vein at 10 mmHg over its stress-free one
+  double touch_area; // walls begin to touch
+} vein_wall;
+
+// What resists the closing of a glued vein is the tissue around, which has to follow inwards: the
+// negative pressures scale with its modulus.
+static double wall_pressure(const vein_wall *w, double a) {
+  double loose = w->sheath < 1 ? loose_pressure(a, w->slope_pa) : 0, glued = 0;
+  if (w->sheath > 0) glued = sonde_vein_tube_pressure(a * w->glued_area, w->wall_pa);
+  if (glued < 0) glued *= w->hold;
+  return loose + w->sheath * (glued - loose);
+}
+
+// The area at a transmural pressure, which rises with it; bracketed Newton. Below the touch of the
+// walls an exponential tail keeps the slope.
+static double open_area(const vein_wall *w, double transmural_pa) {
+  SONDE_ASSERT(isfinite(transmural_pa) && w->hold > 0);
   const double d = 1e-5;
-  if (transmural_pa < 0) transmural_pa /= hold;
-  double touch = sonde_vein_tube_pressure(contact_area, wall_pa);
-  double touch_slope = (sonde_vein_tube_pressure(contact_area + d, wall_pa) - touch) / d;
+  double touch = wall_pressure(w, w->touch_area);
+  double touch_slope = (wall_pressure(w, w->touch_area + d) - touch) / d;
   if (transmural_pa < touch)
-    return contact_area * exp((transmural_pa - touch) / (touch_slope * contact_area));
-  double low = contact_area, high = 8, a = 1;
+    return w->touch_area * exp((transmural_pa - touch) / (touch_slope * w->touch_area));
+  double low = w->touch_area, high = w->sheath < 1 ? filled_area - 2 * d : 8, a = 1;
   for (int i = 0; i < 60; ++i) {
-    double p = sonde_vein_tube_pressure(a, wall_pa), excess = p - transmural_pa;
+    double p = wall_pressure(w, a), excess = p - transmural_pa;
     if (fabs(excess) < 1e-6) break;
     if (excess > 0)
       high = a;
     else
       low = a;
-    double next = a - excess * d / (sonde_vein_tube_pressure(a + d, wall_pa) - p);
+    double next = a - excess * d / (wall_pressure(w, a + d) - p);
     a = next > low && next < high ? next : 0.5 * (low + high);
   }
   return a;
 }
 
-double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa) {
-  return sonde_vein_area_in(pathology, outside_pa, 1);
+static vein_wall wall_of(const sonde_pathology *pathology, bool in_fat) {
+  double wall = pathology->wall_shear_pa;
+  vein_wall w = {.wall_pa = wall,
+                 .sheath = clamp(pathology->sheath, 0, 1),
+                 .hold = in_fat ? sonde_fat_pa / sonde_muscle_pa : 1,
+                 .glued_area = 1,
+                 .touch_area = closed_area};
+  w.slope_pa = in_fat ? superficial_slope_pa : deep_slope_pa;
+  if (wall > 0) w.slope_pa *= clamp(wall, least_wall_pa, most_wall_pa) / study_wall_pa;
+  w.slope_pa = fmax(w.slope_pa, 1.5 * closing_slope_pa);
+  if (w.sheath > 0) {
+    vein_wall glued = w;
+    glued.sheath = 1, glued.hold = 1, glued.touch_area = contact_area;
+    w.glued_area = open_area(&glued, reference_pa);
+    w.touch_area = contact_area / w.glued_area;
+  }
+  return w;
 }
 
-double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, double hold) {
+double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa) {
+  return sonde_vein_area_in(pathology, outside_pa, false);
+}
+
+double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, bool in_fat) {
   SONDE_ASSERT(pathology != NULL && isfinite(outside_pa));
   double solid = clamp(pathology->thrombus_fraction, 0, 1), ratio = 0;
   if (solid < 1) {
-    double wall = pathology->wall_shear_pa;
-    double rest = open_area(pathology->venous_pressure_pa, wall, hold);
-    ratio += (1 - solid) * open_area(pathology->venous_pressure_pa - outside_pa, wall, hold) / rest;
+    vein_wall w = wall_of(pathology, in_fat);
+    double rest = open_area(&w, pathology->venous_pressure_pa);
+    ratio += (1 - solid) * open_area(&w, pathology->venous_pressure_pa - outside_pa) / rest;
   }
   if (!(solid > 0)) return ratio;
   // A clot keeps its volume; the tissue that is squeezed out along the vessel stretches it.
@@ -97,19 +156,23 @@ double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, d
   return ratio + solid * (1 / (1 + k * e / (1 + 0.0558 * e)));
 }
 
+// In a loose sheath: the elastic modulus of pressure and strain while blood fills the artery, and
+// buckling of the wall where the transmural pressure falls through zero. Glued: the study's law.
 double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa) {
   SONDE_ASSERT(pathology != NULL && isfinite(outside_pa));
-  double relative = artery_reference_pa / fmax(pathology->arterial_pressure_pa, 1e3);
-  double e = outside_pa > 0 ? outside_pa * 1e-3 * relative : 0;
-  return fmax(exp(-(0.0185 + 0.0030 * e) * e), least_area);
+  double inside = fmax(pathology->arterial_pressure_pa, 1e3), pressed = fmax(outside_pa, 0);
+  double e = pressed * 1e-3 * artery_reference_pa / inside;
+  double glued = exp(-(0.0185 + 0.0030 * e) * e), loose = fmax(1 - pressed / artery_modulus_pa, 0);
+  loose *= loose * (1 + exp(-(inside + buckling_pa) / buckling_width_pa)) /
+           (1 + exp(-(inside - pressed + buckling_pa) / buckling_width_pa));
+  return fmax(loose + clamp(pathology->sheath, 0, 1) * (glued - loose), least_area);
 }
 
-double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot) {
+double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot, bool in_fat) {
   double scale = clot ? pathology->lumen_scale : 1.0;
   if (clot && pathology->thrombus_fraction >= 1) return scale;
-  double wall = pathology->wall_shear_pa;
-  return scale *
-         sqrt(open_area(pathology->venous_pressure_pa, wall, 1) / open_area(reference_pa, wall, 1));
+  vein_wall w = wall_of(pathology, in_fat);
+  return scale * sqrt(open_area(&w, pathology->venous_pressure_pa));
 }
 
 // Wall 150 kPa, 0.8 mm on 3.11 mm, in neo-Hookean muscle: bisection on the area.

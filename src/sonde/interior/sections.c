@@ -36,7 +36,6 @@ static sonde_status resample(sonde_interior *in, uint32_t which, const sonde_ves
     sonde_vessel_section one = {.rest_m = v_lerp(a->centre_m, b->centre_m, t),
                                 .radius_m = a->radius_m + t * (b->radius_m - a->radius_m),
                                 .depth_m = a->depth_m + t * (b->depth_m - a->depth_m),
-                                .hold = 1,
                                 .coupling = 1};
     if (!(one.radius_m > 0) || !v_finite(one.rest_m))
       return sonde_fail(error, SONDE_ARGUMENT, "vessel %u has a point without radius", which);
@@ -121,8 +120,7 @@ sonde_status sonde_sections_create(sonde_interior *in, sonde_error *error) {
       sonde_vessel_section *section = &in->section[which][i];
       sonde_column_point at;
       (void)sonde_interior_locate(in, section->rest_m, &at);
-      // A vein in the fat gives way sooner than one in muscle.
-      if (at.depth_m < at.muscle_m) section->hold = sonde_fat_pa / sonde_muscle_pa;
+      section->in_fat = at.depth_m < at.muscle_m;
       // Where a branch opens into another vessel two walls would move the same tissue: there that
       // of the branch does not, and beyond it leads the more the farther the two walls are apart.
       for (uint32_t other = 0; other < which; ++other) {

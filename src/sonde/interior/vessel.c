@@ -122,26 +122,31 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
   const sonde_pathology *all = &in->pathology[which];
   const uint32_t count = in->section_count[which];
   sonde_vessel_state *state = in->state[which];
-  // What it holds without and with clot, and its radius at rest over the model's.
+  // What it holds without and with clot, and its radius at rest over the model's, between muscles
+  // and in the fat.
   sonde_pathology held[2] = {*all, *all};
   held[0].thrombus_fraction = 0;
-  double scale[2], blend = 1;
-  scale[0] = artery ? sonde_artery_rest_scale(all) : sonde_vein_rest_scale(&held[0], false);
-  scale[1] = artery || !(all->thrombus_fraction > 0) ? scale[0] : sonde_vein_rest_scale(all, true);
+  double scale[2][2], blend = 1;
+  for (int fat = 0; fat < 2; ++fat) {
+    scale[0][fat] =
+        artery ? sonde_artery_rest_scale(all) : sonde_vein_rest_scale(&held[0], false, fat);
+    scale[1][fat] = artery || !(all->thrombus_fraction > 0) ? scale[0][fat]
+                                                            : sonde_vein_rest_scale(all, true, fat);
+  }
   if (!(input->dt_s < 0) && in->ready) blend = 1 - exp(-input->dt_s / relaxation_s);
   for (uint32_t i = 0; i < count; ++i) {
     const sonde_vessel_section *section = &in->section[which][i];
     sonde_vessel_state *v = &state[i];
     const bool clot = !artery && sonde_pathology_clot(all, section->rest_m.z);
     double half_short, half_long, goal = 1; // most sections, most of the time
-    v->outside_pa = pressure_on(in, section, l);
+    v->outside_pa = pressure_on(in, section, l) + input->cuff_pa;
     if (artery)
       goal = sonde_artery_area_ratio(&held[clot], v->outside_pa);
     else if (v->outside_pa > 0 || clot)
-      goal = sonde_vein_area_in(&held[clot], v->outside_pa, section->hold);
+      goal = sonde_vein_area_in(&held[clot], v->outside_pa, section->in_fat);
     v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
     v->coupling = section->coupling * clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
-    v->rest_radius_m = section->radius_m * scale[clot];
+    v->rest_radius_m = section->radius_m * scale[clot][section->in_fat];
     sonde_vessel_shape(in->kind[which], &held[clot], clot, v->area_ratio, &half_short, &half_long);
     v->half_short_m = half_short * v->rest_radius_m;
     v->half_long_m = half_long * v->rest_radius_m;
