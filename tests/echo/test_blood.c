@@ -173,7 +173,7 @@ static void speckle_follows_the_walls(void **state) {
     double w = q.y > 0 ? 0.8e-3 * exp(-(q.x * q.x + (q.z - 0.15) * (q.z - 0.15)) / 2 / 4e-4) : 0;
     moved[i] = v_madd(q, -w, vec3(0, 1, 0));
   }
-  push(&b, 2.5);
+  push(&b, 1.2);
   look(&b, moved);
   sonde_vessel_state v;
   assert_true(sonde_interior_vessel_at_plane(b.interior, 0, b.pose, &v));

@@ -185,7 +185,7 @@ static void cubes_follow_the_interior(void **state) {
   for (uint32_t i = 0; i < b.leg.model.surface.vertex_count; ++i) {
     sonde_vec3 v = b.leg.model.surface.vertices[i];
     double away = v.x * v.x + (v.z - 0.15) * (v.z - 0.15);
-    if (v.y > 0 && away < 0.02 * 0.02) b.forces[i] = vec3(0, -0.5, 0);
+    if (v.y > 0 && away < 0.02 * 0.02) b.forces[i] = vec3(0, -0.35, 0);
   }
   look(&b, NULL);
   uint32_t count;

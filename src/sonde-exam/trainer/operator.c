@@ -11,7 +11,7 @@ typedef struct habit {
   double skip;                         // share of the places that are left out
   double along_m, across_m, twist_rad; // spread of the aim
   double approach_m_s, press_m_s, travel_m_s;
-  double force_from_n, force_to_n;   // stops at a force drawn from here, 0: by the image
+  double share_from, share_to;       // stops at a share of the place's firm force, 0: by the image
   double beyond_from_n, beyond_to_n; // the same above the limit of force
   double closed_ratio, open_ratio;   // of the vein: called closed, called open
   double past_firm_n;                // above the place's firm force: ends a press on an open vein
@@ -47,8 +47,8 @@ static const habit HABIT[] = {
      .approach_m_s = 0.05,
      .press_m_s = 0.035,
      .travel_m_s = 0.05,
-     .force_from_n = 6,
-     .force_to_n = 20,
+     .share_from = 0.25,
+     .share_to = 0.8,
      .closed_ratio = 0.7,
      .open_ratio = 0.7,
      .pause_s = 4,
@@ -65,8 +65,8 @@ static const habit HABIT[] = {
      .approach_m_s = 0.02,
      .press_m_s = 0.008,
      .travel_m_s = 0.05,
-     .force_from_n = 5,
-     .force_to_n = 9,
+     .share_from = 0.2,
+     .share_to = 0.36,
      .closed_ratio = 0.75,
      .open_ratio = 0.85,
      .pause_s = 0.6,
@@ -91,9 +91,10 @@ static const habit HABIT[] = {
 static const char *const NAMES[] = {"expert", "novice", "timid", "forceful", NULL};
 
 static const double SETTLED_M = 0.003;
-static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 6, HOLD_S = 0.2;
-static const double GIVES_WAY = 0.8, FIRM_N = 15; // share of the force so far
-static const double NEAR_LIMIT = 0.95, CALL_FORCE_N = 8, RELEASE_M_S = 0.08;
+static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 1.5, HOLD_S = 0.2;
+static const double GIVES_WAY = 0.8; // share of the force so far, once above SLIP_SHARE
+static const double SLIP_SHARE = 0.6, CALL_SHARE = 0.32; // of the place's firm force
+static const double NEAR_LIMIT = 0.95, RELEASE_M_S = 0.08;
 
 typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, DONE } phase;
 
@@ -136,10 +137,11 @@ static void aim(sonde_operator *op) {
   op->aim_m = op->plan.point[op->place].at.along_m + calm * spread(op, h->along_m);
   op->aim_across_m = calm * spread(op, h->across_m);
   op->aim_twist_rad = calm * spread(op, h->twist_rad);
-  double limit_n = op->plan.point[op->place].target.limit_n;
-  op->stop_n = NEAR_LIMIT * limit_n;
-  if (h->force_to_n > 0) op->stop_n = uniform(op, h->force_from_n, h->force_to_n);
-  if (h->beyond_to_n > 0) op->stop_n = limit_n + uniform(op, h->beyond_from_n, h->beyond_to_n);
+  const sonde_force_target *target = &op->plan.point[op->place].target;
+  op->stop_n = NEAR_LIMIT * target->limit_n;
+  if (h->share_to > 0) op->stop_n = target->firm_n * uniform(op, h->share_from, h->share_to);
+  if (h->beyond_to_n > 0)
+    op->stop_n = target->limit_n + uniform(op, h->beyond_from_n, h->beyond_to_n);
   op->ratio = (double)NAN;
   op->peak_n = op->felt_n = 0;
   op->felt_depth_m = -INFINITY;
@@ -207,9 +209,9 @@ static void weigh_press(sonde_operator *op) {
   const habit *h = &op->habit;
   SONDE_ASSERT(op->place < op->plan.count);
   uint32_t segment = op->plan.point[op->place].segment;
-  bool by_image = !(h->force_to_n > 0);
+  bool by_image = !(h->share_to > 0);
   bool closed = op->ratio <= h->closed_ratio + (by_image ? 0.02 : 0);
-  double firm_n = by_image ? op->plan.point[op->place].target.firm_n : CALL_FORCE_N;
+  double firm_n = (by_image ? 1 : CALL_SHARE) * op->plan.point[op->place].target.firm_n;
   bool firm = op->peak_n >= firm_n;
   bool open = !closed && op->ratio >= h->open_ratio && firm;
   op->attempt++;
@@ -272,11 +274,12 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
 
     bool ends = force_n >= op->stop_n || op->depth_m >= DEEPEST_M;
     // The skin slips from the probe; a light touch may bounce.
-    ends |= op->peak_n > FIRM_N && force_n < GIVES_WAY * op->peak_n;
+    double place_n = op->plan.point[op->place].target.firm_n;
+    ends |= op->peak_n > SLIP_SHARE * place_n && force_n < GIVES_WAY * op->peak_n;
     // Who goes by the image ends at a closed vein, and at one that stays open at a firm force.
     double vein = sonde_vein_ratio(s);
-    double firm_n = op->plan.point[op->place].target.firm_n + h->past_firm_n;
-    if (!(h->force_to_n > 0 || h->beyond_to_n > 0))
+    double firm_n = place_n + h->past_firm_n;
+    if (!(h->share_to > 0 || h->beyond_to_n > 0))
       ends |= vein <= h->closed_ratio || (force_n >= firm_n && vein >= h->open_ratio);
     if (!ends) break;
     op->phase = HOLD;
