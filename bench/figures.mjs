@@ -62,7 +62,7 @@ const GROUPS = {
     sources: ['src/sonde/interior', 'src/sonde-fit/fit', ...engine, 'data/thigh'],
     measure(bin) {
       const values = {}
-      for (const force of ['8', '16', '20']) {
+      for (const force of ['2', '4', '6', '8']) {
         const press = name => json(bin, 'press', '--site', '27', '--probe', 'linear', '--force-n', force, '--case', name)
         const healthy = press('healthy')
         values[`at_${force}_n`] = { healthy: healthy.vein_area_ratio, artery: healthy.artery_area_ratio, chronic: press('chronic_occlusive').vein_area_ratio }
