@@ -7,10 +7,11 @@
 #include <string.h>
 
 static const char VERB[] = "generate";
+enum { MOST_DRAWS = 32 }; // of what finds room in a scanned leg
 
 typedef struct options {
-  const char *output, *section, *skin, *femur, *muscle;
-  int left;
+  const char *output, *section, *skin, *femur, *muscle, *labels, *names;
+  int left, axes; // axes -1: not given
   bool json;
   long seed;
   double fat_m, edge_m, fine_edge_m; // fat NaN: not given
@@ -24,6 +25,7 @@ static void prepare(void *to) {
                              .edge_m = 6 * 1e-3,
                              .fine_edge_m = 3 * 1e-3,
                              .sex = -1,
+                             .axes = -1,
                              .known = sonde_thigh_unknown()};
 }
 
@@ -32,7 +34,8 @@ typedef struct work {
   sonde_thigh_shape *shape;
   sonde_model *model;
   sonde_leg_report leg;
-  sonde_mesh skin, femur, muscle;
+  sonde_leg_labels part;
+  char drawn[64]; // what the scan does not show
 } work;
 
 static double *member(sonde_thigh *thigh, const sonde_thigh_parameter *p) {
@@ -41,6 +44,7 @@ static double *member(sonde_thigh *thigh, const sonde_thigh_parameter *p) {
 
 static const char *const SEXES[] = {"female", "male", NULL};
 static const char *const SIDES[] = {"right", "left", NULL};
+static const char *const AXES[] = {"ras", "lps", NULL};
 
 static const app_option TABLE[] = {
     OPT_INTEGER(seed, "seed", "N", 0, 4294967295, "of what is drawn"),
@@ -51,13 +55,22 @@ static const app_option TABLE[] = {
     OPT_REAL(edge_m, "edge-mm", "E", 4, 12, 1e-3, "edges of the skin away from the vein"),
     OPT_REAL(fine_edge_m, "fine-edge-mm", "E", 2, 6, 1e-3, "edges along the vein's course"),
     OPT_JSON(json),
-    OPT_GROUP("From a scanned leg (.ply, .obj, .stl in mm); length and girths are measured, what "
-              "the surfaces do not show is drawn"),
+    OPT_GROUP("From a scanned leg: surfaces (.ply, .obj, .stl in mm) or labels; length and girths "
+              "are measured, what the scan does not show is drawn"),
     OPT_TEXT(skin, "skin", "FILE", "skin of a leg, longer than the thigh"),
-    OPT_TEXT(femur, "femur", "FILE", "whole femur in the same frame"),
+    OPT_TEXT(femur, "femur", "FILE",
+             "whole femur in the same frame; without it the skin's upper end is the groin"),
     OPT_TEXT(muscle, "muscle", "FILE",
              "envelope of the muscles; without it fat comes from parameters"),
+    OPT_TEXT(labels, "labels", "FILE", "volume of labels (.nii, .nii.gz) instead of the surfaces"),
+    OPT_TEXT(names, "label-names", "FILE",
+             "a number and a name on each line, with one of the words background, tissue, skin, "
+             "fat, muscle, femur, bone, vein, artery; default 1 skin, 2 fat, 3 muscle, 4 bone, "
+             "5 vein, 6 artery"),
     OPT_WORD(left, "side", "SIDE", SIDES, "a left leg is mirrored"),
+    OPT_WORD(axes, "axes", "AXES", AXES,
+             "where x and y of the surfaces run: ras (right, front) or lps (left, back); z to the "
+             "head; labels are ras"),
     OPT_GROUP("Parameters; what is not given is drawn"),
     OPT_REAL(fat_m, "fat-mm", "F", 4, 35, 1e-3,
              "mean fat of the four sides at mid-thigh, in usual proportions")};
@@ -82,9 +95,14 @@ static uint32_t list_parameters(app_option *list, uint32_t room) {
 
 static int check(void *from) {
   options *a = from;
-  if (!a->skin != !a->femur)
-    return app_usage_error(VERB, "--skin and --femur go together, one is missing");
-  if (a->muscle && !a->skin) return app_usage_error(VERB, "--muscle needs --skin and --femur");
+  if ((a->femur || a->muscle) && !a->skin)
+    return app_usage_error(VERB, "--femur and --muscle go together with --skin, which is missing");
+  if (a->labels && (a->skin || a->axes >= 0))
+    return app_usage_error(VERB, "--labels goes without --skin, --femur, --muscle and --axes");
+  if (a->names && !a->labels) return app_usage_error(VERB, "--label-names needs --labels");
+  if (a->skin && !a->femur && a->axes < 0)
+    return app_usage_error(VERB, "--skin without --femur needs --axes ras or lps: which side of it "
+                                 "is in front cannot be seen from the skin");
   if (a->sex >= 0) a->known.sex = a->sex ? SONDE_SEX_MALE : SONDE_SEX_FEMALE;
 
   // Fat of the four sides with the proportions of the distributions' means; a side that is given by
@@ -124,7 +142,12 @@ static void print(const options *a, work *w) {
       app_json_close();
     }
     app_json_close();
-    if (a->skin) app_json_integer("rays_missed", w->leg.missed);
+    if (a->skin || a->labels) {
+      app_json_integer("rays_missed", w->leg.missed);
+      app_json_text("drawn", w->drawn);
+    }
+    if (a->labels)
+      app_json("voxel_mm:%g filled_share:%g", w->part.voxel_m * 1e3, w->part.filled_share);
     app_json_text("model", a->output);
     app_json_end();
     return;
@@ -134,41 +157,79 @@ static void print(const options *a, work *w) {
     printf("%-18s %8.2f  %s\n", p[k].name, *member(&w->thigh, &p[k]) / p[k].unit, p[k].text);
   printf("%u nodes, %.2f l, smallest angle %.1f degrees\n", w->model->surface.vertex_count,
          mesh.volume_m3 * 1e3, mesh.smallest_angle_rad * 57.29577951308232);
-  if (a->skin && w->leg.missed)
+  if (w->leg.missed)
     printf("%u of %u rays missed the skin and were filled\n", w->leg.missed, w->leg.rays);
+  if (w->part.filled_share > 0)
+    printf("%.2g %% of the leg were holes without a label and were filled\n",
+           100 * w->part.filled_share);
+  if (*w->drawn) printf("not in the scan, drawn by the rules: %s\n", w->drawn);
   printf("%s\n", a->output);
+}
+
+// Draws what is not known, takes the shape from that or from the scan, and makes the model of it.
+static sonde_status make(const options *a, work *w, uint64_t seed, sonde_error *error) {
+  const bool scanned = a->skin || a->labels;
+  const sonde_mesh *femur = w->part.femur.face_count ? &w->part.femur : NULL;
+  const sonde_mesh *muscle = w->part.muscle.face_count ? &w->part.muscle : NULL;
+  sonde_axes axes = SONDE_AXES_ANY;
+  if (a->labels || a->axes >= 0) axes = a->axes == 1 ? SONDE_AXES_LPS : SONDE_AXES_RAS;
+  const sonde_leg_scan scan = {.skin = &w->part.skin,
+                               .femur = femur,
+                               .muscle = muscle,
+                               .left = a->left == 1,
+                               .axes = axes,
+                               .vein = &w->part.vein,
+                               .artery = &w->part.artery,
+                               .length_m = isnan(a->known.length_m) ? 0 : a->known.length_m};
+  sonde_thigh known = a->known;
+  sonde_status status = SONDE_OK;
+  // A bone that is drawn follows the girths: it is drawn once more with those of the scan.
+  for (int pass = 0; !status && pass < (scanned && !femur ? 2 : 1); ++pass) {
+    sonde_thigh_shape_destroy(w->shape);
+    w->shape = NULL;
+    status = sonde_thigh_draw(&known, seed, &w->thigh, error);
+    if (!status)
+      status = scanned ? sonde_thigh_shape_scan(&scan, &w->thigh, &w->shape, &w->leg, error)
+                       : sonde_thigh_shape_create(&w->thigh, &w->shape, error);
+    known.girth_m = w->thigh.girth_m;
+    known.girth_proximal_m = w->thigh.girth_proximal_m;
+    known.girth_distal_m = w->thigh.girth_distal_m;
+  }
+  if (scanned)
+    snprintf(w->drawn, sizeof w->drawn, "%s%s%s%sbranches, mechanics", femur ? "" : "femur, ",
+             muscle ? "" : "fat, ", w->leg.vein_found ? "" : "vein, ",
+             w->leg.artery_found ? "" : "artery, ");
+
+  char provenance[200];
+  snprintf(provenance, sizeof provenance, "Synthetic: %s%s, seed %ld",
+           scanned ? "scanned leg with generated " : "generated thigh, not measured on a person",
+           w->drawn, a->seed);
+  sonde_thigh_def def = sonde_thigh_def_default();
+  def.name = scanned ? "scanned thigh" : "generated thigh";
+  def.provenance = provenance;
+  def.edge_m = a->edge_m;
+  def.fine_edge_m = a->fine_edge_m;
+  return status ? status : sonde_thigh_build(&w->thigh, w->shape, &def, &w->model, error);
 }
 
 static int run(void *from) {
   const options *a = from;
   assert(a->output);
   work w = {0};
-  sonde_error error = {0};
+  sonde_error error = {0}, later;
   app_progress_begin("making the thigh");
-  // The shape: from what is drawn, or from a scanned leg.
-  sonde_status status = sonde_thigh_draw(&a->known, (uint64_t)a->seed, &w.thigh, &error);
-  if (!status && !a->skin) {
-    status = sonde_thigh_shape_create(&w.thigh, &w.shape, &error);
-  } else if (!status) {
-    status = sonde_mesh_load(a->skin, 1e-3, &w.skin, &error);
-    if (!status) status = sonde_mesh_load(a->femur, 1e-3, &w.femur, &error);
-    if (!status && a->muscle) status = sonde_mesh_load(a->muscle, 1e-3, &w.muscle, &error);
-    sonde_leg_scan scan = {&w.skin, &w.femur, a->muscle ? &w.muscle : NULL, a->left == 1};
-    if (!status) status = sonde_thigh_shape_scan(&scan, &w.thigh, &w.shape, &w.leg, &error);
-  }
+  sonde_status status = SONDE_OK;
+  if (a->labels) status = sonde_leg_labels_load(a->labels, a->names, &w.part, &error);
+  if (a->skin) status = sonde_mesh_load(a->skin, 1e-3, &w.part.skin, &error);
+  if (!status && a->femur) status = sonde_mesh_load(a->femur, 1e-3, &w.part.femur, &error);
+  if (!status && a->muscle) status = sonde_mesh_load(a->muscle, 1e-3, &w.part.muscle, &error);
 
-  // The model on it.
-  char provenance[200];
-  snprintf(provenance, sizeof provenance, "Synthetic: %s, seed %ld",
-           a->skin ? "scanned surfaces with generated vessels and mechanics"
-                   : "generated thigh, not measured on a person",
-           a->seed);
-  sonde_thigh_def def = sonde_thigh_def_default();
-  def.name = a->skin ? "scanned thigh" : "generated thigh";
-  def.provenance = provenance;
-  def.edge_m = a->edge_m;
-  def.fine_edge_m = a->fine_edge_m;
-  if (!status) status = sonde_thigh_build(&w.thigh, w.shape, &def, &w.model, &error);
+  // What is drawn may find no room in a leg that is given; then it is drawn again, from numbers
+  // that no other seed takes. The first complaint is the one to tell.
+  const int tries = a->skin || a->labels ? MOST_DRAWS : 1;
+  bool loaded = !status;
+  for (int k = 0; loaded && (k == 0 || status == SONDE_ARGUMENT) && k < tries; ++k)
+    status = make(a, &w, (uint64_t)a->seed + ((uint64_t)k << 32), k ? &later : &error);
   if (!status) status = sonde_model_save(w.model, a->output, &error);
   if (!status && a->section) status = sonde_thigh_sections(w.model, a->section, &error);
 
@@ -176,16 +237,15 @@ static int run(void *from) {
   if (!status) print(a, &w);
   sonde_model_destroy(w.model);
   sonde_thigh_shape_destroy(w.shape);
-  sonde_mesh_clear(&w.skin);
-  sonde_mesh_clear(&w.femur);
-  sonde_mesh_clear(&w.muscle);
+  sonde_leg_labels_clear(&w.part);
   return status ? app_fail(VERB, &error) : APP_OK;
 }
 
 const app_command cmd_generate = {
     .verb = "generate",
     .summary = "make a thigh from parameters and a seed",
-    .usage = "[--seed N] [PARAMETERS] [--skin FILE --femur FILE] -o MODEL [options]",
+    .usage =
+        "[--seed N] [PARAMETERS] [--skin FILE --femur FILE | --labels FILE] -o MODEL [options]",
     .text = "Makes a thigh: skin, fat, muscle compartments, femur, vessels and the mechanics of a "
             "complete model, which every command that takes a model reads. What is not given is "
             "drawn from documented distributions; equal seeds and parameters give equal files. "

@@ -25,6 +25,7 @@ build_packages() {
   need_library libpng libpng-dev
   need_library sqlite3 libsqlite3-dev
   need_library yaml-0.1 libyaml-dev
+  need_library - libnifti2-dev # no pkg-config file
   need_library zlib zlib1g-dev
   need_command node nodejs
   if ! has npm; then missing+=(npm ca-certificates); fi

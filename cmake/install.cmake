@@ -16,20 +16,23 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/sondeConfig.cmake.in
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/sondeConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/sondeConfig.cmake ${PROJECT_BINARY_DIR}/sondeConfigVersion.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/FindNIFTI2.cmake
   DESTINATION ${package_dir})
 # Relative to the .pc file, so that the tree may be moved.
 file(RELATIVE_PATH SONDE_PREFIX_FROM_PC
   ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
-# sonde_pc(library OF house... OTHERS modules...): the .pc file of one library.
+# sonde_pc(library OF house... OTHERS modules... LIBS flags...): the .pc file of one library; LIBS are of
+# static libraries that pkg-config does not know.
 function(sonde_pc SONDE_PC_NAME)
-  cmake_parse_arguments(PARSE_ARGV 1 pc "" "" "OF;OTHERS")
+  cmake_parse_arguments(PARSE_ARGV 1 pc "" "" "OF;OTHERS;LIBS")
   list(JOIN pc_OF " " SONDE_PC_HOUSE)
   list(JOIN pc_OTHERS " " SONDE_PC_OTHERS)
+  list(JOIN pc_LIBS " " SONDE_PC_LIBS)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/sonde.pc.in ${PROJECT_BINARY_DIR}/${SONDE_PC_NAME}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/${SONDE_PC_NAME}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()
 sonde_pc(sonde OTHERS zlib)
-sonde_pc(sonde-files OF sonde OTHERS libpng yaml-0.1 zlib)
+sonde_pc(sonde-files OF sonde OTHERS libpng yaml-0.1 zlib LIBS -lnifti2 -lznz)
 sonde_pc(sonde-limb OF sonde-files sonde)
 sonde_pc(sonde-sweep OF sonde OTHERS zlib)
 sonde_pc(sonde-scene OF sonde-files sonde)

@@ -93,33 +93,73 @@ SONDE_API void sonde_thigh_shape_destroy(sonde_thigh_shape *shape); /**< @thread
 SONDE_API sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shape **shape,
                                                 sonde_error *error);
 
+/** Which way x and y of scanned surfaces run in the patient; z runs to the head. */
+typedef enum sonde_axes {
+  SONDE_AXES_ANY, /**< unknown; the leg may lie anyhow */
+  SONDE_AXES_RAS, /**< x to the right, y to the front, as in NIfTI files */
+  SONDE_AXES_LPS  /**< x to the left, y to the back, as in DICOM files */
+} sonde_axes;
+
 /** Surfaces of a leg. Any resolution; holes and crossing triangles do not matter where the rays
-    from the middle of the thigh still meet the outside. Model units (m), any position. */
+    from the middle of the thigh still meet the outside. Model units (m). */
 typedef struct sonde_leg_scan {
-  const sonde_mesh *skin;   /**< longer than the thigh */
-  const sonde_mesh *femur;  /**< whole */
+  const sonde_mesh *skin;  /**< longer than the thigh; without `femur` its upper end is the groin */
+  const sonde_mesh *femur; /**< whole; NULL: from the parameters, `axes` must be known */
   const sonde_mesh *muscle; /**< envelope of the muscles; NULL: fat from the parameters */
   bool left;
+  sonde_axes axes;        /**< a leg that is turned by more than 120 degrees from it is refused */
+  const sonde_mesh *vein; /**< femoral; NULL: from the parameters */
+  const sonde_mesh *artery;
+  double length_m; /**< of the thigh, without `femur`; 0: 0.39 of a whole leg, else `thigh`'s */
 } sonde_leg_scan;
 
 /** What a scan was turned into. */
 typedef struct sonde_leg_report {
-  uint32_t rays, missed; /**< of the skin; missed ones are filled from their neighbours */
-  double femur_length_m;
+  uint32_t rays, missed;         /**< of the skin; missed ones are filled from their neighbours */
+  double femur_length_m;         /**< 0 without a femur */
+  bool vein_found, artery_found; /**< beside the groin, so that they replace the parameters */
 } sonde_leg_report;
 
 /**
  * Finds hip, knee, front and medial side from the femur, cuts the thigh out between 9 % and 80 % of
- * the femur's length, and samples the surfaces from its middle.
- * @param thigh length, girths, fat (with `muscle`) and femur diameter are replaced by what is
- *   measured
+ * the femur's length, and samples the surfaces from its middle. Without a femur the thigh begins at
+ * the skin's upper end, its sides follow from the axes, and the bone is the parameters'.
+ * @param thigh length, girths, fat (with `muscle`), femur (with `femur`), vein and artery (with
+ *   theirs) are replaced by what is measured
  * @param[out] shape owned by the caller
- * @return MESH when the femur has no head or more than 5 % of the rays miss the skin
+ * @return MESH when the femur has no head or more than 5 % of the rays miss the skin, when femur
+ *   and `left` or `axes` disagree (a mirrored leg, LPS for RAS), or when a length is that of a
+ *   wrong unit; ARGUMENT when neither femur nor axes are known
  * @thread owner
  */
 SONDE_API sonde_status sonde_thigh_shape_scan(const sonde_leg_scan *scan, sonde_thigh *thigh,
                                               sonde_thigh_shape **shape, sonde_leg_report *report,
                                               sonde_error *error);
+
+/** Surfaces of a leg from a volume of labels; empty meshes for what has no label. */
+typedef struct sonde_leg_labels {
+  sonde_mesh skin;   /**< of everything that is labelled; open where the volume's side cuts it */
+  sonde_mesh femur;  /**< largest part of what is called femur, else bone */
+  sonde_mesh muscle; /**< of muscles and bones */
+  sonde_mesh vein, artery;
+  double voxel_m;      /**< longest edge of a voxel */
+  double filled_share; /**< unlabelled holes, which are filled, of the leg's volume */
+} sonde_leg_labels;
+
+/**
+ * Reads a volume of labels (.nii, .nii.gz; x to the right, y to the front, z to the head) and
+ * makes closed surfaces of its tissues by marching tetrahedra at 1.5 mm or the voxel.
+ * @param names_path text file with a number and a name on each line, in which one word is
+ *   background, tissue, skin, fat, muscle, femur, bone, vein or artery; NULL: 1 skin, 2 fat,
+ *   3 muscle, 4 bone, 5 vein, 6 artery
+ * @param[out] labels released by sonde_leg_labels_clear()
+ * @return FORMAT: no volume of whole numbers, neither sform nor qform, a wrong unit, a number
+ *   without a name; MESH: nothing labelled, two legs, holes of more than 5 % of the leg; IO
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_leg_labels_load(const char *path, const char *names_path,
+                                             sonde_leg_labels *labels, sonde_error *error);
+SONDE_API void sonde_leg_labels_clear(sonde_leg_labels *labels); /**< @thread owner */
 
 /** How the model of a thigh is made. */
 typedef struct sonde_thigh_def {

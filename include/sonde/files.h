@@ -1,7 +1,7 @@
 /**
  * @file files.h
- * Files in formats that need a library of their own (libsonde-files links libpng, libyaml and
- * zlib), and reports.
+ * Files in formats that need a library of their own (libsonde-files links libpng, libyaml,
+ * libnifti2 and zlib), and reports.
  */
 #ifndef SONDE_FILES_H
 #define SONDE_FILES_H

@@ -207,7 +207,8 @@ static void a_real_leg_becomes_a_thigh(void **state) {
       carry(&femur, pose, true);
       carry(&muscle, pose, true);
     }
-    sonde_leg_scan scan = {&skin, &femur, &muscle, k == 1};
+    sonde_leg_scan scan = {.skin = &skin, .femur = &femur, .muscle = &muscle, .left = k == 1};
+    if (k == 0) scan.axes = SONDE_AXES_LPS;
     assert_int_equal(sonde_thigh_draw(&known, 1, &thigh[k], NULL), SONDE_OK);
     if (sonde_thigh_shape_scan(&scan, &thigh[k], &shape, &report, &error))
       fail_msg("%s", error.message);
@@ -222,6 +223,14 @@ static void a_real_leg_becomes_a_thigh(void **state) {
     sonde_model_destroy(model);
     sonde_thigh_shape_destroy(shape);
   }
+  // The same leg called the other side, or in coordinates that run the other way, is refused.
+  sonde_leg_scan turned = {.skin = &skin, .femur = &femur};
+  sonde_thigh unused = thigh[0];
+  sonde_leg_report none;
+  sonde_thigh_shape *no_shape = NULL;
+  sonde_error why = {0};
+  assert_int_equal(sonde_thigh_shape_scan(&turned, &unused, &no_shape, &none, &why), SONDE_MESH);
+  print_message("%s\n", why.message);
   // Girths as measured on the surface by its SOURCE.md: 431 to 629 mm over the middle of the thigh.
   assert_near(thigh[0].girth_m, 0.51, 0.02);
   assert_near(thigh[0].length_m, 0.71 * 0.44, 0.005);
@@ -239,7 +248,7 @@ static void a_real_leg_becomes_a_thigh(void **state) {
 static void a_ball_is_no_femur(void **state) {
   (void)state;
   sonde_mesh ball = fixture_sphere(3, 0.2);
-  sonde_leg_scan scan = {&ball, &ball, NULL, false};
+  sonde_leg_scan scan = {.skin = &ball, .femur = &ball};
   sonde_leg_report report;
   sonde_thigh known = sonde_thigh_unknown(), thigh;
   sonde_thigh_shape *shape = NULL;

@@ -132,7 +132,17 @@ rejects 'need --csv' replay nowhere.rec --from 1
 rejects 'girth-mm.*300 to 900' generate --girth-mm 100 -o out.sonde
 rejects 'girth-mm.*muscle' generate --girth-mm 350 --fat-mm 35 -o out.sonde
 rejects 'sex.*female or male' generate --sex other -o out.sonde
-rejects 'go together' generate --skin "$in/skin.ply" -o out.sonde
+rejects 'axes ras or lps' generate --skin "$in/skin.ply" -o out.sonde
+rejects 'go together' generate --femur "$in/skin.ply" -o out.sonde
+rejects 'skin is 1' generate --skin "$in/skin.ply" --axes ras -o out.sonde
+rejects 'without --skin' generate --labels leg.nii --axes ras -o out.sonde
+rejects 'needs --labels' generate --label-names names.txt -o out.sonde
+rejects 'nowhere\.nii\.gz' generate --labels nowhere.nii.gz -o out.sonde
+rejects '\.nii or \.nii\.gz' generate --labels "$in/skin.ply" -o out.sonde
+echo 'no volume' >"$in/text.nii"
+rejects 'no NIfTI header' generate --labels "$in/text.nii" -o out.sonde
+echo '7 spleen' >"$in/names.txt"
+rejects 'names\.txt:1: label 7' generate --labels nowhere.nii --label-names "$in/names.txt" -o out.sonde
 rejects 'missing' generate --seed 1
 rejects 'nowhere\.stl' generate --skin nowhere.stl --femur nowhere.stl -o out.sonde
 rejects 'femur' generate --skin "$in/skin.ply" --femur "$in/skin.ply" -o out.sonde

@@ -6,7 +6,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 declare -A options=(
   [run]="--port --headless --seconds --record --json"
   [fit]="--surface --sites --stages -o --json"
-  [generate]="--seed --sex --girth-mm --fat-mm --skin --femur --section-svg -o --json"
+  [generate]="--seed --sex --girth-mm --fat-mm --skin --femur --labels --axes --section-svg -o --json"
   [predict]="--measurements --sites --interaction --json"
   [measure]="--sites --probe --step-mm --limit-n -o --json"
   [identify]="--ramp-hold --slide --simulate --site --preset -o --json"

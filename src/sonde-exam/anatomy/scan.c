@@ -5,7 +5,13 @@
 
 static const double CUT_TOP = 0.09, CUT_BOTTOM = 0.80; // of the femur's length, from the head
 static const double HEAD = 0.05, CONDYLES = 0.12;      // ends of the femur, of its length
-static const double LEAST_HEAD_M = 0.02, MOST_MISSED = 0.05;
+static const double LEAST_HEAD_M = 0.02, LEAST_BEHIND_M = 0.004, MOST_MISSED = 0.05;
+static const double LEAST_FEMUR_M = 0.25, MOST_FEMUR_M = 0.7;
+// Skin alone: longest and shortest piece; from where on it is a whole leg, of which a thigh from
+// the groin crease to above the knee is this share (Winter: 0.75 of 0.245 of a stature whose legs
+// are 0.47 long); and what is left out below the upper end, where a scan is cut unevenly.
+static const double LEAST_SKIN_M = 0.2, MOST_SKIN_M = 1.3, WHOLE_LEG_M = 0.6, THIGH_OF_LEG = 0.39;
+static const double UPPER_END_M = 0.005, WIDEST_LEG_M = 0.12;
 static const double REACH_M = 0.25, BONE_REACH_M = 0.07, WIDEST_BONE = 1.6; // of the shaft
 
 // Columns of x, y, z: model_from_scan p = axes^T (p - origin).
@@ -16,6 +22,10 @@ typedef struct frame {
 
 static sonde_vec3 to_scan(const frame *f, sonde_vec3 p) {
   return v_madd(v_madd(v_madd(f->origin, p.x, f->x), p.y, f->y), p.z, f->z);
+}
+static sonde_vec3 to_frame(const frame *f, sonde_vec3 p) {
+  sonde_vec3 d = v_sub(p, f->origin);
+  return vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
 }
 static sonde_vec3 across(sonde_vec3 d, sonde_vec3 axis) { return v_madd(d, -v_dot(d, axis), axis); }
 
@@ -80,7 +90,26 @@ static sonde_vec3 end_offset(const sonde_mesh *femur, const frame *f, bool far) 
   return across(v_sub(centre, f->origin), f->z);
 }
 
-static sonde_status leg_frame(const sonde_leg_scan *scan, frame *f, sonde_error *error) {
+// What to say about a length that lies in the range when it is taken in another unit.
+static const char *unit_hint(double length_m, double low, double high) {
+  if (length_m * 1e3 >= low && length_m * 1e3 <= high) return "; the numbers seem to be m, not mm";
+  if (length_m * 10 >= low && length_m * 10 <= high) return "; the numbers seem to be cm, not mm";
+  if (length_m * 1e-3 >= low && length_m * 1e-3 <= high)
+    return "; the numbers seem to be um, not mm";
+  return "";
+}
+
+// The patient's right, front and head side in the scan's coordinates; x and z of the leg in them.
+static void patient_axes(const sonde_leg_scan *scan, sonde_vec3 *medial, sonde_vec3 *front,
+                         sonde_vec3 *down) {
+  SONDE_ASSERT(scan->axes != SONDE_AXES_ANY);
+  double sign = scan->axes == SONDE_AXES_RAS ? 1 : -1;
+  *medial = vec3(scan->left ? sign : -sign, 0, 0);
+  *front = vec3(0, sign, 0);
+  *down = vec3(0, 0, -1);
+}
+
+static sonde_status femur_frame(const sonde_leg_scan *scan, frame *f, sonde_error *error) {
   // z runs along the straight line through the middles of the shaft's middle third.
   const sonde_mesh *femur = scan->femur;
   if (femur->vertex_count < 50 || femur->face_count < 50)
@@ -108,18 +137,45 @@ static sonde_status leg_frame(const sonde_leg_scan *scan, frame *f, sonde_error 
     measure_extent(scan->femur, f);
   }
   double length = f->high - f->low;
-  if (!(v_norm(head) > LEAST_HEAD_M) || !(length > 0.25 && length < 0.7))
+  if (!(v_norm(head) > LEAST_HEAD_M) || !(length > LEAST_FEMUR_M && length < MOST_FEMUR_M))
     return sonde_fail(error, SONDE_MESH,
-                      "the femur is %.0f mm long and its head stands %.1f mm beside the shaft, "
-                      "expected 250 to 700 and more than 20: a whole femur in mm",
-                      length * 1e3, v_norm(head) * 1e3);
+                      "the femur is %.3g mm long and its head stands %.2g mm beside the shaft, "
+                      "expected 250 to 700 and more than 20: a whole femur in mm%s",
+                      length * 1e3, v_norm(head) * 1e3,
+                      unit_hint(length, LEAST_FEMUR_M, MOST_FEMUR_M));
   sonde_vec3 wide = wide_direction(scan->femur, f, f->high - CONDYLES * length, f->high, true);
   wide = v_unit(across(wide, f->z), head);
   f->x = v_dot(wide, head) < 0 ? v_neg(wide) : wide;
   f->y = v_cross(f->z, f->x);
   if (scan->left) f->y = v_neg(f->y);
+  double behind = -v_dot(end_offset(femur, f, true), f->y);
   f->origin = v_madd(f->origin, f->low + CUT_TOP * length, f->z);
-  return SONDE_OK;
+
+  // Condyles reach far behind the shaft's line and little in front of it: a mirrored leg turns
+  // that.
+  const char *side = scan->left ? "left" : "right", *mirrored = scan->left ? "right" : "left";
+  if (behind < -LEAST_BEHIND_M)
+    return sonde_fail(
+        error, SONDE_MESH,
+        "the femur's condyles stand %.0f mm in front of its shaft as a %s leg, expected "
+        "behind: it is a %s leg, or its coordinates are mirrored",
+        -behind * 1e3, side, mirrored);
+  if (scan->axes == SONDE_AXES_ANY) return SONDE_OK;
+  sonde_vec3 medial, front, down;
+  patient_axes(scan, &medial, &front, &down);
+  const bool x = v_dot(f->x, medial) < -0.5, y = v_dot(f->y, front) < -0.5;
+  const bool z = v_dot(f->z, down) < -0.5, ras = scan->axes == SONDE_AXES_RAS;
+  if (!x && !y && !z) return SONDE_OK;
+  return sonde_fail(
+      error, SONDE_MESH, "the %s femur's %s the wrong way in %s coordinates: %s", side,
+      z        ? "knee points"
+      : x && y ? "head and back point"
+      : x      ? "head points"
+               : "back points",
+      ras ? "RAS" : "LPS",
+      z     ? "the leg stands on its head"
+      : ras ? "x and y seem to run to the left and back (LPS), expected right and front"
+            : "x and y seem to run to the right and front (RAS), expected left and back");
 }
 
 // Distance to the first hit from a point of the frame, NaN when there is none.
@@ -176,6 +232,76 @@ static void centre_line(const sonde_surface_index *skin, const frame *f, sonde_t
   }
 }
 
+// Turns the frame until z runs along a direction of the frame, and moves its origin.
+static void turn(frame *f, sonde_vec3 along, sonde_vec3 origin) {
+  sonde_vec3 z = v_unit(along, vec3(0, 0, 1));
+  sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
+  frame old = *f;
+  f->origin = to_scan(&old, origin);
+  f->x = v_sub(to_scan(&old, x), old.origin);
+  f->y = v_sub(to_scan(&old, y), old.origin);
+  f->z = v_sub(to_scan(&old, z), old.origin);
+}
+
+// Frame and length of a thigh that begins at the upper end of the skin.
+static sonde_status skin_frame(const sonde_leg_scan *scan, const sonde_surface_index *index,
+                               const sonde_thigh *thigh, sonde_tube *tube, frame *f,
+                               sonde_error *error) {
+  if (scan->axes == SONDE_AXES_ANY)
+    return sonde_fail(
+        error, SONDE_ARGUMENT,
+        "without a femur the axes of the skin's coordinates must be known, expected RAS "
+        "or LPS");
+  patient_axes(scan, &f->x, &f->y, &f->z);
+  f->origin = scan->skin->vertices[0];
+  measure_extent(scan->skin, f);
+  double high = f->high - f->low;
+  if (!(high >= LEAST_SKIN_M && high <= MOST_SKIN_M))
+    return sonde_fail(error, SONDE_MESH, "the skin is %.3g mm high, expected %.0f to %.0f%s",
+                      high * 1e3, LEAST_SKIN_M * 1e3, MOST_SKIN_M * 1e3,
+                      unit_hint(high, LEAST_SKIN_M, MOST_SKIN_M));
+  double length = scan->length_m > 0   ? scan->length_m
+                  : high > WHOLE_LEG_M ? THIGH_OF_LEG * high
+                                       : thigh->length_m;
+  tube->length_m = whole_nm(length);
+
+  // The origin begins in the middle of the upper part.
+  sonde_vec3 sum = vec3(0, 0, 0);
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < scan->skin->vertex_count; ++i) {
+    sonde_vec3 d = v_sub(scan->skin->vertices[i], f->origin);
+    if (v_dot(d, f->z) > f->low + length) continue;
+    sum = v_add(sum, d), ++count;
+  }
+  const sonde_vec3 upright = f->z;
+  sonde_vec3 middle = across(v_scale(sum, 1.0 / (count > 0 ? count : 1)), upright);
+  f->origin = v_madd(v_add(f->origin, middle), f->low + UPPER_END_M, upright);
+  for (int pass = 0; pass < 3; ++pass) {
+    // z runs beside the middles of the sections by the slope that the femur has against them.
+    const uint32_t last = SONDE_TUBE_ROWS - 1;
+    const double swing = sonde_shape_swing(thigh);
+    centre_line(index, f, tube);
+    sonde_vec3 from = vec3(tube->x_m[0] - 0.5 * swing, tube->y_m[0], 0);
+    sonde_vec3 to = vec3(tube->x_m[last] + 0.5 * swing, tube->y_m[last], length);
+    turn(f, v_sub(to, from), from);
+
+    // The upper end of a leg that leans slants: it begins as far above the end of the axis on one
+    // side as it ends below it on the other. An open end is taken to lie across the patient.
+    measure_extent(scan->skin, f);
+    double slant = v_norm(across(upright, f->z)) * WIDEST_LEG_M;
+    double up = cast(index, f, vec3(0, 0, 0.5 * length), vec3(0, 0, -1), high);
+    if (isfinite(up)) slant = fmin(slant, 0.5 * length - up - f->low);
+    double start = f->low + 2 * fmax(slant, 0) + UPPER_END_M;
+    f->origin = v_madd(f->origin, start, f->z);
+    f->high -= start;
+  }
+  if (f->high >= length) return SONDE_OK;
+  return sonde_fail(error, SONDE_MESH,
+                    "the skin shows %.0f mm below its upper end, expected the thigh's length of "
+                    "%.0f: give a length-mm that it shows",
+                    f->high * 1e3, length * 1e3);
+}
+
 enum { KNOTS = 5 };
 
 // The bone's middle at some heights, by the surface within 8 mm; straight in between and beyond.
@@ -185,8 +311,7 @@ static void bone_line(const sonde_mesh *femur, const frame *f, double length,
     double z = (0.15 + 0.2 * k) * length;
     if (!slab_centre(femur, f, z - 0.008, z + 0.008, &knot[k]))
       knot[k] = k > 0 ? to_scan(f, knot[k - 1]) : f->origin;
-    sonde_vec3 d = v_sub(knot[k], f->origin);
-    knot[k] = vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
+    knot[k] = to_frame(f, knot[k]);
     knot[k].z = z;
   }
 }
@@ -289,37 +414,110 @@ typedef struct indices {
   sonde_surface_index *skin, *femur, *muscle;
 } indices;
 
+// A vessel's part below the fascia at some heights: middle, and the diameter of the round tube that
+// has its area. False when there is none.
+static bool measure_vessel(const sonde_mesh *vessel, const frame *f, const sonde_thigh *thigh,
+                           const sonde_thigh_shape *shape, double low, double high,
+                           sonde_vec3 *middle, double *diameter_m) {
+  SONDE_ASSERT(low < high);
+  double area = 0;
+  sonde_vec3 sum = vec3(0, 0, 0);
+  for (uint32_t k = 0; vessel && k < vessel->face_count; ++k) {
+    sonde_vec3 p[3], centre = vec3(0, 0, 0);
+    for (int c = 0; c < 3; ++c) {
+      p[c] = to_frame(f, vessel->vertices[vessel->faces[k][c]]);
+      centre = v_madd(centre, 1.0 / 3, p[c]);
+    }
+    if (centre.z < low || centre.z > high) continue;
+    double deep = -sonde_tube_outside(&shape->skin, centre);
+    if (deep < thigh->skin_m + sonde_shape_fat(shape, centre)) continue;
+    double part = 0.5 * v_norm(v_cross(v_sub(p[1], p[0]), v_sub(p[2], p[0])));
+    area += part;
+    sum = v_madd(sum, part, centre);
+  }
+  *middle = v_scale(sum, area > 0 ? 1 / area : 0);
+  *diameter_m = area / (high - low) / SONDE_PI;
+  return area > 0;
+}
+
+// The scan's own measures replace the parameters.
+static void measure(const sonde_leg_scan *scan, const frame *f, sonde_thigh_shape *shape,
+                    sonde_thigh *thigh, sonde_leg_report *report) {
+  const sonde_tube *skin = &shape->skin;
+  const double length = skin->length_m, half = 0.5 * length;
+  SONDE_ASSERT(length > 0);
+  thigh->length_m = length;
+  thigh->girth_m = sonde_tube_girth(skin, half);
+  thigh->girth_proximal_m = fmax(sonde_tube_girth(skin, 0), thigh->girth_m);
+  thigh->girth_distal_m = fmin(sonde_tube_girth(skin, length), thigh->girth_m);
+  if (scan->femur) {
+    const uint32_t middle = SONDE_TUBE_ROWS / 2;
+    thigh->femur_m = whole_nm(sonde_tube_girth(&shape->femur, half) / SONDE_PI);
+    thigh->femur_lateral_m = clamp(skin->x_m[0] - shape->femur.x_m[0], 0, 0.045);
+    thigh->femur_anterior_m = clamp(shape->femur.y_m[middle] - skin->y_m[middle], 0, 0.025);
+  }
+  if (scan->muscle) {
+    double *side[] = {&thigh->fat_inner_m, &thigh->fat_front_m, &thigh->fat_outer_m,
+                      &thigh->fat_back_m};
+    for (int k = 0; k < 4; ++k)
+      *side[k] = whole_nm(
+          clamp(sonde_tube_lookup(skin, shape->fat_m, 0.5 * SONDE_PI * k, half), 0.002, 0.06));
+  }
+
+  // Vein and artery below the groin; how deep the vein lies at mid-thigh.
+  const double at[2][2] = {{0.01, 0.07}, {0.46, 0.54}};
+  double *cover[2] = {&thigh->vein_cover_m, &thigh->canal_cover_m};
+  sonde_vec3 middle;
+  double diameter;
+  for (int k = 0; k < 2; ++k) {
+    if (!measure_vessel(scan->vein, f, thigh, shape, at[k][0] * length, at[k][1] * length, &middle,
+                        &diameter) ||
+        diameter < 0.004 || diameter > 0.018) // no femoral vein of these thighs: it is drawn
+      continue;
+    double deep = -sonde_tube_outside(&shape->skin, middle);
+    double free_m = deep - sonde_shape_fat(shape, middle) - thigh->skin_m - 0.5 * diameter;
+    *cover[k] = whole_nm(clamp(free_m, k ? 0.003 : 0.001, k ? 0.04 : 0.03));
+    if (k > 0) continue;
+    report->vein_found = true;
+    thigh->vein_m = whole_nm(diameter);
+    thigh->vein_angle_rad = clamp(sonde_tube_angle_of(&shape->skin, middle), 0.78, 1.57);
+  }
+  report->artery_found = measure_vessel(scan->artery, f, thigh, shape, at[0][0] * length,
+                                        at[0][1] * length, &middle, &diameter) &&
+                         diameter >= 0.003 && diameter <= 0.014;
+  if (report->artery_found) thigh->artery_m = whole_nm(diameter);
+}
+
 static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_thigh *thigh,
                            sonde_thigh_shape *shape, sonde_leg_report *report, sonde_error *error) {
   frame f = {0};
-  sonde_status status = leg_frame(scan, &f, error);
+  sonde_tube *skin = &shape->skin;
+  sonde_status status = scan->femur ? femur_frame(scan, &f, error)
+                                    : skin_frame(scan, in->skin, thigh, skin, &f, error);
   if (status) return status;
-  report->femur_length_m = f.high - f.low;
-  double length = whole_nm((CUT_BOTTOM - CUT_TOP) * report->femur_length_m);
+  if (scan->femur) {
+    report->femur_length_m = f.high - f.low;
+    skin->length_m = whole_nm((CUT_BOTTOM - CUT_TOP) * report->femur_length_m);
+  }
+  const double length = shape->femur.length_m = skin->length_m;
   SONDE_ASSERT(length > 0);
-  shape->skin.length_m = shape->femur.length_m = length;
 
   // The frame rotates until z runs along the bone's middles in the thigh, x = y = 0 at their mean.
-  for (int pass = 0; pass < 4; ++pass) {
+  for (int pass = 0; scan->femur && pass < 4; ++pass) {
     sonde_vec3 knot[KNOTS], mean, slope;
     bone_line(scan->femur, &f, length, knot);
     fit_line(knot, KNOTS, &mean, &slope);
     sonde_vec3 z = v_unit(slope, vec3(0, 0, 1));
-    sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
-    frame old = f;
-    f.origin = to_scan(&old, v_madd(mean, -mean.z / z.z, z));
-    f.x = v_sub(to_scan(&old, x), old.origin);
-    f.y = v_sub(to_scan(&old, y), old.origin);
-    f.z = v_sub(to_scan(&old, z), old.origin);
+    turn(&f, z, v_madd(mean, -mean.z / z.z, z));
   }
 
-  centre_line(in->skin, &f, &shape->skin);
+  centre_line(in->skin, &f, skin);
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
-      double angle = tube_angle(i), z = row_height(shape->skin.length_m, j);
-      sonde_vec3 middle = vec3(shape->skin.x_m[j], shape->skin.y_m[j], z);
+      double angle = tube_angle(i), z = row_height(skin->length_m, j);
+      sonde_vec3 middle = vec3(skin->x_m[j], skin->y_m[j], z);
       double r = cast(in->skin, &f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
-      shape->skin.radius_m[j][i] = r;
+      skin->radius_m[j][i] = r;
       report->rays++;
       if (!isfinite(r)) report->missed++;
     }
@@ -328,15 +526,18 @@ static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_
                       "%u of %u rays from the middle of the thigh miss the skin, expected at most "
                       "5 %%: it must reach from the groin to the knee around the femur",
                       report->missed, report->rays);
-  fill_table(shape->skin.radius_m);
-  smooth(shape->skin.radius_m, 2);
-  sample_femur(scan, in->femur, &f, &shape->femur);
+  fill_table(skin->radius_m);
+  smooth(skin->radius_m, 2);
+
+  if (in->femur)
+    sample_femur(scan, in->femur, &f, &shape->femur);
+  else
+    sonde_shape_place_femur(thigh, shape);
   sonde_shape_fill_fat(thigh, shape);
-  const sonde_tube *skin = &shape->skin;
   if (in->muscle) {
     for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
       for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
-        double angle = tube_angle(i), z = row_height(skin->length_m, j);
+        double angle = tube_angle(i), z = row_height(length, j);
         sonde_vec3 inward = v_neg(sonde_tube_normal(skin, angle, z));
         double depth = cast(in->muscle, &f, sonde_tube_point(skin, angle, z), inward, 0.06);
         shape->fat_m[j][i] = isfinite(depth) ? fmax(depth - thigh->skin_m, 0.002) : NAN;
@@ -344,39 +545,33 @@ static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_
     fill_table(shape->fat_m);
     smooth(shape->fat_m, 12);
   }
-  // The scan's own measures replace the parameters.
-  double half = 0.5 * length;
-  thigh->length_m = length;
-  thigh->girth_m = sonde_tube_girth(skin, half);
-  thigh->girth_proximal_m = fmax(sonde_tube_girth(skin, 0), thigh->girth_m);
-  thigh->girth_distal_m = fmin(sonde_tube_girth(skin, length), thigh->girth_m);
-  thigh->femur_m = whole_nm(sonde_tube_girth(&shape->femur, half) / SONDE_PI);
-  const uint32_t middle = SONDE_TUBE_ROWS / 2;
-  thigh->femur_lateral_m = clamp(skin->x_m[0] - shape->femur.x_m[0], 0, 0.045);
-  thigh->femur_anterior_m = clamp(shape->femur.y_m[middle] - skin->y_m[middle], 0, 0.025);
-  if (in->muscle != NULL) {
-    double *side[] = {&thigh->fat_inner_m, &thigh->fat_front_m, &thigh->fat_outer_m,
-                      &thigh->fat_back_m};
-    for (int k = 0; k < 4; ++k)
-      *side[k] = whole_nm(
-          clamp(sonde_tube_lookup(skin, shape->fat_m, 0.5 * SONDE_PI * k, half), 0.002, 0.06));
-  }
+
+  measure(scan, &f, shape, thigh, report);
   return sonde_thigh_check(thigh, error);
 }
 
 sonde_status sonde_thigh_shape_scan(const sonde_leg_scan *scan, sonde_thigh *thigh,
                                     sonde_thigh_shape **out, sonde_leg_report *report,
                                     sonde_error *error) {
-  SONDE_ASSERT(scan->skin && scan->femur && thigh && report);
+  SONDE_ASSERT(scan->skin && thigh && report);
   *out = NULL;
   *report = (sonde_leg_report){0};
   indices in = {0};
   sonde_thigh_shape *shape = SONDE_NEW(sonde_thigh_shape, 1);
   sonde_status status = shape ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = sonde_surface_index_create(scan->skin, &in.skin, error);
-  if (!status) status = sonde_surface_index_create(scan->femur, &in.femur, error);
+  if (!status && scan->femur) status = sonde_surface_index_create(scan->femur, &in.femur, error);
   if (!status && scan->muscle) status = sonde_surface_index_create(scan->muscle, &in.muscle, error);
   if (!status) status = sample(scan, &in, thigh, shape, report, error);
+  // What is drawn beside what is measured may be too much for the leg.
+  double z_m = 0, least;
+  if (!status && !(scan->femur && scan->muscle) &&
+      (least = sonde_shape_least_muscle(shape, thigh, &z_m)) < SONDE_LEAST_MUSCLE_M)
+    status =
+        sonde_fail(error, SONDE_ARGUMENT,
+                   "fat-mm and femur leave %.1f mm of muscle at %.0f mm from the groin in this "
+                   "leg, expected 12: less fat would do",
+                   least * 1e3, z_m * 1e3);
   sonde_surface_index_destroy(in.skin);
   sonde_surface_index_destroy(in.femur);
   sonde_surface_index_destroy(in.muscle);

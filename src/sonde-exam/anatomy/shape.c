@@ -1,7 +1,6 @@
 // The shape that parameters describe.
 #include "anatomy/shape.h"
 
-static const double LEAST_MUSCLE_M = 0.012;
 static const double FAT_TAPER = 0.15; // more at the groin, less at the knee
 
 void sonde_shape_fill_fat(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
@@ -44,6 +43,29 @@ double sonde_shape_least_muscle(const sonde_thigh_shape *shape, const sonde_thig
   return least;
 }
 
+// Where the sections' middle stands medial of the femur at the knee.
+static double knee_offset(const sonde_thigh *thigh) { return fmin(0.003, thigh->femur_lateral_m); }
+
+double sonde_shape_swing(const sonde_thigh *thigh) {
+  return thigh->femur_lateral_m - knee_offset(thigh);
+}
+
+void sonde_shape_place_femur(const sonde_thigh *thigh, sonde_thigh_shape *shape) {
+  // The shaft widens towards the trochanter and the condyles. z runs along it, so that it is the
+  // middle of the sections that comes from the medial side to the femur on the way to the knee.
+  sonde_tube *femur = &shape->femur;
+  SONDE_ASSERT(femur->length_m > 0 && thigh->femur_m > 0);
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
+    double t = (double)j / (SONDE_TUBE_ROWS - 1);
+    double up = fmax(0, (0.15 - t) / 0.15), down = fmax(0, (t - 0.7) / 0.3);
+    double radius = 0.5 * thigh->femur_m * (1 + 0.35 * (up * up + down * down));
+    double lateral = knee_offset(thigh) + sonde_shape_swing(thigh) * (1 - t) * (1 - t);
+    femur->x_m[j] = whole_nm(shape->skin.x_m[j] - lateral);
+    femur->y_m[j] = shape->skin.y_m[j] + thigh->femur_anterior_m;
+    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) femur->radius_m[j][i] = whole_nm(radius);
+  }
+}
+
 sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shape **out,
                                       sonde_error *error) {
   *out = NULL;
@@ -66,30 +88,19 @@ sonde_status sonde_thigh_shape_create(const sonde_thigh *thigh, sonde_thigh_shap
       shape->skin.radius_m[j][i] = whole_nm(factor * shape->skin.radius_m[j][i]);
   }
   sonde_shape_fill_fat(thigh, shape);
-  // The shaft widens towards the trochanter and the condyles. z runs along it, so that it is the
-  // middle of the sections that comes from the medial side to the femur on the way to the knee.
-  sonde_tube *femur = &shape->femur;
-  const double at_knee_m = fmin(0.003, thigh->femur_lateral_m);
-  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
-    double t = (double)j / (SONDE_TUBE_ROWS - 1);
-    double up = fmax(0, (0.15 - t) / 0.15), down = fmax(0, (t - 0.7) / 0.3);
-    double radius = 0.5 * thigh->femur_m * (1 + 0.35 * (up * up + down * down));
-    double swing = thigh->femur_lateral_m - at_knee_m;
-    double lateral = at_knee_m + swing * (1 - t) * (1 - t); // of the section's middle
-    shape->skin.x_m[j] = whole_nm(swing * (0.5 - t)); // straight line through the bone's middles
-    femur->x_m[j] = whole_nm(shape->skin.x_m[j] - lateral);
-    femur->y_m[j] = thigh->femur_anterior_m;
-    for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) femur->radius_m[j][i] = whole_nm(radius);
-  }
+  const double swing = sonde_shape_swing(thigh);
+  for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j)
+    shape->skin.x_m[j] = whole_nm(swing * (0.5 - (double)j / (SONDE_TUBE_ROWS - 1)));
+  sonde_shape_place_femur(thigh, shape);
   double z_m = 0, least = sonde_shape_least_muscle(shape, thigh, &z_m);
-  if (least >= LEAST_MUSCLE_M) {
+  if (least >= SONDE_LEAST_MUSCLE_M) {
     *out = shape;
     return SONDE_OK;
   }
   // A girth that would do: the femur moves aside with the girth and takes a part of a wider radius.
   const double share = 0.65;
   double here = sonde_tube_girth(&shape->skin, z_m);
-  double more = 2 * SONDE_PI * (LEAST_MUSCLE_M - least) * thigh->girth_m / here / share;
+  double more = 2 * SONDE_PI * (SONDE_LEAST_MUSCLE_M - least) * thigh->girth_m / here / share;
   sonde_thigh_shape_destroy(shape);
   return sonde_fail(error, SONDE_ARGUMENT,
                     "girth-mm is %g: fat and femur leave %.1f mm of muscle at %.0f mm from the "

@@ -6,6 +6,8 @@
 #include "base/maths.h"
 #include "sonde/anatomy.h"
 
+#define SONDE_LEAST_MUSCLE_M 0.012 // between fat and femur
+
 enum { SONDE_TUBE_ROWS = 121, SONDE_TUBE_COLUMNS = 180 };
 
 // A closed surface around a middle line, cut flat at both ends: radius at equal angles about the
@@ -53,6 +55,10 @@ sonde_status sonde_tube_mesh(const sonde_tube *tube, double edge_m, sonde_mesh *
 
 // Fills the fat table from the four sides of the parameters.
 void sonde_shape_fill_fat(const sonde_thigh *thigh, sonde_thigh_shape *shape);
+// Places the parameters' femur beside the middles of the skin's sections, which a generated thigh
+// has on a straight line from the medial side at the groin, by `swing`, to the femur at the knee.
+void sonde_shape_place_femur(const sonde_thigh *thigh, sonde_thigh_shape *shape);
+double sonde_shape_swing(const sonde_thigh *thigh);
 double sonde_shape_fat(const sonde_thigh_shape *shape, sonde_vec3 point_m);
 // Least muscle between fat and femur over the shape, and where.
 double sonde_shape_least_muscle(const sonde_thigh_shape *shape, const sonde_thigh *thigh,
