@@ -62,13 +62,16 @@ static const app_option TABLE[] = {
         kind, "model", "KIND", fit_bulk_kinds,
         "deformable model: two-layer, the paper's; laffont, linear springs through the volume; "
         "lee, biphasic springs and a volume force in three layers over the bone; linear or "
-        "neo-hookean, tetrahedra. The last four have a few moduli for the whole thigh"),
-    OPT_REAL(bulk.edge_m, "mesh-mm", "L", 2, 50, 1e-3,
-             "edge of the tetrahedra at the skin of a volumetric model"),
-    OPT_REAL(bulk.fine_edge_m, "mesh-fine-mm", "L", 1, 50, 1e-3, "the same near the sites"),
+        "neo-hookean, tetrahedra; condensed, linear tetrahedra seen from the skin, whose stiffness "
+        "is computed when a model is put to use. The last five have a few moduli for the whole "
+        "thigh"),
+    OPT_REAL(
+        bulk.edge_m, "mesh-mm", "L", 2, 50, 1e-3,
+        "edge of the tetrahedra at the skin of a volumetric model; default 15, of condensed 20"),
+    OPT_REAL(bulk.fine_edge_m, "mesh-fine-mm", "L", 1, 50, 1e-3,
+             "the same near the sites; default 5, of condensed 10"),
     OPT_REAL(bulk.poisson, "poisson", "NU", 0, 0.499, 1,
-             "Poisson ratio of linear and "
-             "neo-hookean"),
+             "Poisson ratio of linear, condensed and neo-hookean"),
     OPT_INTEGER(
         def.stages, "stages", "N", 1, 3,
         "last stage. With 1 the model has one pair per site, no edges in the estimation and "

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-const char *const fit_bulk_kinds[] = {"two-layer", "laffont", "lee", "linear", "neo-hookean", NULL};
+const char *const fit_bulk_kinds[] = {SONDE_MODEL_KIND_NAMES, NULL};
 
 sonde_status fit_bulk_run(const fit_bulk_job *job, sonde_error *error) {
   sonde_progress progress = app_progress();

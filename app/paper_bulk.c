@@ -117,7 +117,7 @@ static sonde_status measure_kind(const paper *p, sonde_model_kind kind, const ch
   options.kind = kind, options.layers = p->model;
   options.sites = p->quick ? 1 : 3, options.depths = 2;
   options.max_steps = p->quick ? 1 : 4;
-  if (p->quick) options.fine_edge_m = options.edge_m;
+  if (p->quick) options.fine_edge_m = 15e-3;
   double *n[3] = {malloc(j->sought.m.count * sizeof(double)),
                   malloc(j->left_out.m.count * sizeof(double)),
                   malloc(j->third.m.count * sizeof(double))};

@@ -17,8 +17,9 @@ enum { SONDE_BULK_PARAMETERS = 6 };
 typedef struct sonde_fit_bulk_def {
   uint32_t version;          /**< SONDE_DEF_VERSION, from sonde_fit_bulk_def_default() */
   sonde_model_kind kind;     /**< a volumetric one; default linear solid */
-  double edge_m;             /**< mean edge of the mesh at the skin; default 15 mm */
-  double fine_edge_m;        /**< within fine_reach_m of a measured site; default 5 mm */
+  double edge_m;             /**< mean edge of the mesh at the skin; 0, the default: 15 mm, of a
+                                  condensed solid 20 mm */
+  double fine_edge_m;        /**< within fine_reach_m of a measured site; 0: 5 mm or 10 mm */
   double fine_reach_m;       /**< default 5 mm */
   double growth;             /**< of the edges per metre of depth; default 1 */
   double poisson;            /**< of solids; default 0.45 */

@@ -25,7 +25,10 @@ typedef enum sonde_model_kind {
                                 Terzopoulos and Waters 1995) */
   SONDE_LINEAR_SOLID,      /**< linear elastic tetrahedra */
   SONDE_NEO_HOOKEAN_SOLID, /**< neo-Hookean tetrahedra */
+  SONDE_CONDENSED_SOLID,   /**< the same as linear ones, condensed to the skin by K* */
 } sonde_model_kind;
+/** Their names in files and on command lines, in this order. */
+#define SONDE_MODEL_KIND_NAMES "two-layer", "laffont", "lee", "linear", "neo-hookean", "condensed"
 
 /** Layers of a volumetric body. */
 typedef enum sonde_bulk_layer {
@@ -54,7 +57,8 @@ typedef struct sonde_bulk {
   sonde_vec3 *node;            /**< [node_count + held_count] at rest, m */
   double *mass_kg, *area_m2;   /**< [node_count]; inner nodes have no area */
   double *shortest_m;          /**< [node_count] shortest edge at the node */
-  uint32_t *start, *neighbour; /**< [node_count + 1], and moving nodes that share an edge */
+  uint32_t *start, *neighbour; /**< [node_count + 1], and moving nodes that share an edge, or
+                                    share K* */
   uint32_t (*element)[4];      /**< [element_count] positively oriented tetrahedra */
   uint32_t *layer;             /**< [element_count] sonde_bulk_layer */
   sonde_bulk_law law;

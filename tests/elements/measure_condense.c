@@ -1,9 +1,8 @@
 // measure_condense MODEL [EDGE_MM [FINE_MM]]: times of a thigh of linear tetrahedra. Its mesh, its
 // stiffness and factor, the condensation on the skin of the sites with its inverse, then for every
 // site a flat square footprint of 24 mm pressed 10 mm deep, bonded and sliding, from the condensed
-// compliance, and for one site from the whole solid and without a factor.
+// compliance, and for one site from the whole solid.
 #include "elements/condense.h"
-#include "elements/volume.h"
 #include "base/base.h"
 #include "base/clock.h"
 #include "base/maths.h"
@@ -32,45 +31,6 @@ static uint32_t footprint(const sonde_tetrahedra *t, const uint32_t *list, uint3
   }
   for (uint32_t k = 0; k < found; ++k) gap[k] = top - gap[k];
   return found;
-}
-
-// The same press without a factor, in steps of 2 mm, by both materials.
-static void settle(const sonde_tetrahedra *t, const double *young, const uint32_t *nodes,
-                   uint32_t count, sonde_vec3 inward) {
-  for (int material = 0; material < 2; ++material) {
-    const sonde_elastic_volume_def def = {.mesh = t,
-                                          .material = (sonde_elastic_material)material,
-                                          .young_pa = young,
-                                          .poisson = 0.479};
-    sonde_elastic_volume *volume;
-    sonde_error error = {0};
-    stop_on(sonde_elastic_volume_create(&def, &volume, &error), &error);
-    double *u = calloc(3 * (size_t)t->node_count, sizeof *u);
-    double *f = calloc(3 * (size_t)t->node_count, sizeof *f), force = 0;
-    sonde_elastic_volume_result result = {0};
-    double start = sonde_clock_now();
-    for (int k = 0; k < 10; ++k) (void)sonde_elastic_volume_forces(volume, u, f);
-    double forces = (sonde_clock_now() - start) / 10;
-    start = sonde_clock_now();
-    for (int step = 1; step <= 5; ++step) {
-      for (uint32_t k = 0; k < count; ++k) {
-        double *to = u + 3 * (size_t)nodes[k], depth = 0.002 * step;
-        to[0] = depth * inward.x, to[1] = depth * inward.y, to[2] = depth * inward.z;
-      }
-      stop_on(sonde_elastic_volume_settle(volume, nodes, count, u, f, &result, &error), &error);
-    }
-    for (uint32_t k = 0; k < count; ++k) {
-      const double *from = f + 3 * (size_t)nodes[k];
-      force += v_dot(inward, vec3(from[0], from[1], from[2]));
-    }
-    printf(
-        "%s without a factor: forces %.2f ms; a step of 2 mm %.0f ms, the last one %u Newton and "
-        "%u conjugate gradient iterations; %.3f N at 10 mm\n",
-        material ? "neo-Hookean" : "linear", 1e3 * forces, 200 * (sonde_clock_now() - start),
-        result.newton, result.cg, force);
-    free(u), free(f);
-    sonde_elastic_volume_destroy(volume);
-  }
 }
 
 int main(int argc, char **argv) {
@@ -160,7 +120,6 @@ int main(int argc, char **argv) {
   }
   printf("the whole solid: %.0f ms a press; forces %.6f and %.6f N, apart by %.1e\n",
          1e3 * (clock[5] - clock[4]), whole, dense, fabs(whole / dense - 1));
-  settle(&t, young, places, found, inward);
   free(u), free(f), free(places), free(gap), free(young), free(kept), free(sites);
   sonde_elastic_scratch_destroy(scratch);
   sonde_condensed_destroy(condensed);

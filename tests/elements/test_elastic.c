@@ -2,7 +2,7 @@
 // space meet their closed forms also where the volume hardly changes, forces and displacements
 // exchange (Betti), sensitivities are derivatives, wrong input is refused.
 #include "solids.h"
-#include "elements/moduli.h"
+#include "elements/elastic.h"
 
 static const char *const NAMES[3] = {"patch", "node", "element"};
 
@@ -191,124 +191,6 @@ static void test_exchange(void **state) {
   sonde_tetrahedra_clear(&t);
 }
 
-// Twice the energy under imposed displacements, and its derivatives by finite differences.
-static double energy_of(sonde_elastic *e, const double *young, double skin, double *u,
-                        const uint32_t *group, double *derivative) {
-  const sonde_tetrahedra *t = e->mesh;
-  assert_ok(sonde_elastic_set(e, young, 0.48, skin, &shape_error));
-  sonde_elastic_scratch *s = make_scratch(e);
-  double *f = calloc(3 * (size_t)e->count, sizeof *f);
-  uint32_t imposed[20];
-  memset(u, 0, 3 * (size_t)e->count * sizeof *u);
-  for (uint32_t k = 0; k < 20; ++k)
-    imposed[k] = k, u[3 * (size_t)e->unknown[k]] = 1e-3, u[3 * (size_t)e->unknown[k] + 1] = 2e-3;
-  assert_ok(sonde_elastic_solve(e, s, imposed, 20, f, u, &shape_error));
-  double work = sonde_dot(f, u, 3 * e->count);
-  if (derivative) sonde_elastic_sensitivity(e, u, group, 2, derivative);
-  assert_true(t->surface_count > 20);
-  free(f);
-  sonde_elastic_scratch_destroy(s);
-  return work;
-}
-
-static void test_sensitivity(void **state) {
-  (void)state;
-  sonde_tetrahedra t = held_ball(0.05, 0.02, 0.014);
-  for (int kind = 0; kind < 3; ++kind) {
-    const sonde_elastic_def def = {.mesh = &t, .dilatation = (sonde_dilatation)kind};
-    sonde_elastic *e = make_solid(&def, 1e4, 0.48);
-    double *young = calloc(t.count, sizeof *young), *u = calloc(3 * (size_t)e->count, sizeof *u);
-    uint32_t *group = calloc(t.count, sizeof *group);
-    double derivative[3], h = 1e-4;
-    for (uint32_t k = 0; k < t.count; ++k)
-      young[k] = 1e4, group[k] = v_norm(t.node[t.corner[k][0]]) > 0.04;
-    double base = energy_of(e, young, 5, u, group, derivative);
-    // All moduli together only scale.
-    assert_near(derivative[0] + derivative[1] + derivative[2], base, 1e-9 * base);
-    for (uint32_t g = 0; g < 3; ++g) {
-      double work[2];
-      for (int side = 0; side < 2; ++side) {
-        double scale = exp(side ? h : -h);
-        for (uint32_t k = 0; k < t.count; ++k) young[k] = 1e4 * (group[k] == g ? scale : 1);
-        work[side] = energy_of(e, young, g == 2 ? 5 * scale : 5, u, group, NULL);
-      }
-      assert_near(derivative[g], (work[1] - work[0]) / (2 * h), 1e-6 * base);
-    }
-    free(young);
-    free(u);
-    free(group);
-    sonde_elastic_destroy(e);
-  }
-  sonde_tetrahedra_clear(&t);
-}
-
-// Moduli of two layers and a membrane from the stiffness of footprints on a solid that has them.
-static void test_moduli(void **state) {
-  (void)state;
-  enum { PLACES = 6, MOST = 200 };
-  sonde_tetrahedra t = held_ball(0.05, 0.02, 0.012);
-  const sonde_elastic_def def = {.mesh = &t};
-  sonde_elastic *e = make_solid(&def, 1e4, 0.45);
-  uint32_t *group = calloc(t.count, sizeof *group), nodes[PLACES][MOST];
-  for (uint32_t k = 0; k < t.count; ++k) group[k] = v_norm(t.node[t.corner[k][0]]) > 0.038;
-  sonde_bonded_footprint prints[PLACES];
-  for (int p = 0; p < PLACES; ++p) {
-    sonde_vec3 inward = vec3(p == 0 || p == 3, p == 1 || p == 4, p == 2 || p == 5);
-    inward = v_scale(inward, p < 3 ? 1 : -1);
-    prints[p] = (sonde_bonded_footprint){.nodes = nodes[p], .inward = inward, .weight_m2 = 1e-6};
-    for (uint32_t i = 0; i < t.surface_count; ++i)
-      if (v_distance(t.node[i], v_scale(inward, -0.05)) < (p % 2 ? 0.008 : 0.025))
-        nodes[p][prints[p].count++] = i;
-    assert_in_range(prints[p].count, 1, MOST);
-  }
-  const double young[2] = {8e3, 3e4}, skin = 20;
-  double stiffness[PLACES];
-  sonde_moduli_result result = {.stiffness = stiffness};
-  sonde_elastic_scratch *s = make_scratch(e);
-  double *each = calloc(t.count, sizeof *each);
-  for (uint32_t k = 0; k < t.count; ++k) each[k] = young[group[k]];
-  assert_ok(sonde_elastic_set(e, each, 0.45, skin, &shape_error));
-  for (int p = 0; p < PLACES; ++p) {
-    double *u = calloc(3 * (size_t)e->count, sizeof *u),
-           *f = calloc(3 * (size_t)e->count, sizeof *f);
-    for (uint32_t k = 0; k < prints[p].count; ++k) {
-      double *to = u + 3 * (size_t)e->unknown[nodes[p][k]];
-      to[0] = prints[p].inward.x, to[1] = prints[p].inward.y, to[2] = prints[p].inward.z;
-    }
-    assert_ok(sonde_elastic_solve(e, s, nodes[p], prints[p].count, f, u, &shape_error));
-    prints[p].stiffness_n_m = sonde_dot(f, u, 3 * e->count);
-    free(u), free(f);
-  }
-  free(each);
-  sonde_elastic_scratch_destroy(s);
-  // From the whole solid, then condensed on the nodes of all footprints.
-  uint32_t *last = calloc(t.surface_count, sizeof *last), last_count = 0;
-  for (uint32_t i = 0; i < t.surface_count; ++i) {
-    bool listed = false;
-    for (int p = 0; p < PLACES; ++p)
-      for (uint32_t k = 0; k < prints[p].count; ++k) listed |= nodes[p][k] == i;
-    if (listed) last[last_count++] = i;
-  }
-  const sonde_elastic_def condensed = {.mesh = &t, .last = last, .last_count = last_count};
-  for (int pass = 0; pass < 2; ++pass) {
-    double start[2] = {2e4, 2e4}, start_skin = 5;
-    if (pass == 1) {
-      sonde_elastic_destroy(e);
-      e = make_solid(&condensed, 1e4, 0.45);
-    }
-    assert_ok(sonde_moduli_fit(e, 0.45, group, 2, prints, PLACES, 2, start, &start_skin, &result,
-                               &shape_error));
-    assert_near(start[0] / young[0], 1, 1e-5);
-    assert_near(start[1] / young[1], 1, 1e-5);
-    assert_near(start_skin / skin, 1, 1e-4);
-    for (int p = 0; p < PLACES; ++p) assert_near(stiffness[p] / prints[p].stiffness_n_m, 1, 1e-6);
-  }
-  free(last);
-  free(group);
-  sonde_elastic_destroy(e);
-  sonde_tetrahedra_clear(&t);
-}
-
 static void test_refusals(void **state) {
   (void)state;
   sonde_tetrahedra t = held_ball(0.05, 0.02, 0.02);
@@ -346,7 +228,6 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_uniform_strain), cmocka_unit_test(test_core_in_a_ball),
       cmocka_unit_test(test_half_space),     cmocka_unit_test(test_exchange),
-      cmocka_unit_test(test_sensitivity),    cmocka_unit_test(test_moduli),
       cmocka_unit_test(test_refusals),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

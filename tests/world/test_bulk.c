@@ -164,6 +164,58 @@ static void forces_are_those_of_an_energy(void **unused) {
   }
 }
 
+// K* between the nodes of the skin is the whole solid: the same force, and the same skin.
+static void condensed_solid_moves_like_the_whole(void **unused) {
+  (void)unused;
+  double force[2];
+  sonde_vec3 *skin[2] = {NULL, NULL};
+  uint32_t count = 0;
+  for (int k = 0; k < 2; ++k) {
+    sonde_model *model = make_ball(k ? SONDE_CONDENSED_SOLID : SONDE_LINEAR_SOLID, NULL, 10e-3);
+    sonde_state *state = make_state(model, SONDE_ENGINE_DOUBLE);
+    count = model->surface.vertex_count;
+    assert_int_equal(sonde_model_nodes(model).count, k ? count : model->bulk->node_count);
+    force[k] = press_bonded(state, 4e-3, 0.02);
+    skin[k] = malloc(count * sizeof **skin);
+    memcpy(skin[k], sonde_state_positions(state), count * sizeof **skin);
+    sonde_state_destroy(state);
+    sonde_model_destroy(model);
+  }
+  double apart = 0;
+  for (uint32_t i = 0; i < count; ++i) apart = fmax(apart, v_distance(skin[0][i], skin[1][i]));
+  print_message("condensed: force %.1e off, skin %.1e of the depth off\n",
+                fabs(force[1] / force[0] - 1), apart / 4e-3);
+  assert_true(fabs(force[1] / force[0] - 1) < 1e-6 && apart < 1e-6 * 4e-3);
+  free(skin[0]), free(skin[1]);
+}
+
+// Its file is the solid's; a skin too large for K* is refused where K* is made.
+static void condensed_solid_is_rebuilt_from_its_file(void **unused) {
+  (void)unused;
+  const char *path = "condensed_test.sonde";
+  sonde_model *model = make_ball(SONDE_CONDENSED_SOLID, NULL, 12e-3), *read = NULL;
+  sonde_error error = {0};
+  assert_int_equal(sonde_model_save(model, path, &error), SONDE_OK);
+  if (sonde_model_load(path, &read, &error)) fail_msg("%s", error.message);
+  remove(path);
+  assert_int_equal(read->kind, SONDE_CONDENSED_SOLID);
+  sonde_state *state[2] = {make_state(model, SONDE_ENGINE_FAST),
+                           make_state(read, SONDE_ENGINE_FAST)};
+  assert_true(press_bonded(state[0], 2e-3, 0.02) == press_bonded(state[1], 2e-3, 0.02));
+  double mass = 0, inner = 0;
+  for (uint32_t i = 0; i < read->bulk->node_count; ++i)
+    *(i < read->surface.vertex_count ? &mass : &inner) += read->bulk->mass_kg[i];
+  assert_true(mass > 0.8 && inner == 0); // of 0.87 kg between skin and bone
+  for (int k = 0; k < 2; ++k) sonde_state_destroy(state[k]);
+  sonde_model_destroy(model);
+  sonde_model_destroy(read);
+  model = make_ball(SONDE_CONDENSED_SOLID, NULL, 4e-3);
+  sonde_world_def def = fixture_world_def();
+  assert_int_equal(sonde_state_create(model, &def, &state[0], &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "expected at most 2500"));
+  sonde_model_destroy(model);
+}
+
 static void neo_hookean_begins_like_the_linear_solid(void **unused) {
   (void)unused;
   double force[2][2];
@@ -296,6 +348,8 @@ int main(void) {
       cmocka_unit_test(shell_moves_as_lame_found),
       cmocka_unit_test(forces_are_those_of_an_energy),
       cmocka_unit_test(neo_hookean_begins_like_the_linear_solid),
+      cmocka_unit_test(condensed_solid_moves_like_the_whole),
+      cmocka_unit_test(condensed_solid_is_rebuilt_from_its_file),
       cmocka_unit_test(single_precision_follows_double),
       cmocka_unit_test(twice_the_stiffness_is_twice_the_force),
       cmocka_unit_test(file_keeps_the_body),

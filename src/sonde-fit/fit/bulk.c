@@ -4,6 +4,7 @@
 #include "fit/fit_inside.h"
 #include "fit/marquardt.h"
 #include "fit/press.h"
+#include "sparse/dense.h"
 #include "tissue/bulk/bulk.h"
 
 #include "base/clock.h"
@@ -15,8 +16,6 @@
 sonde_fit_bulk_def sonde_fit_bulk_def_default(void) {
   return (sonde_fit_bulk_def){.version = SONDE_DEF_VERSION,
                               .kind = SONDE_LINEAR_SOLID,
-                              .edge_m = 15e-3,
-                              .fine_edge_m = 5e-3,
                               .fine_reach_m = 5e-3,
                               .growth = 1,
                               .poisson = 0.45,
@@ -44,7 +43,8 @@ static uint32_t list_parameters(sonde_model_kind kind, sonde_bulk_law *law,
               {SONDE_NEO_HOOKEAN_SOLID, "young_muscle_pa", &law->young_pa[SONDE_LAYER_MUSCLE]}};
   uint32_t count = 0;
   for (size_t k = 0; k < SONDE_COUNT_OF(list); ++k)
-    if (list[k].kind == kind) name[count] = list[k].name, value[count++] = list[k].value;
+    if (list[k].kind == (kind == SONDE_CONDENSED_SOLID ? SONDE_LINEAR_SOLID : kind))
+      name[count] = list[k].name, value[count++] = list[k].value;
   SONDE_ASSERT(count > 0 && count <= SONDE_BULK_PARAMETERS);
   return count;
 }
@@ -90,23 +90,15 @@ static sonde_status press_curve(void *user, uint32_t worker, uint32_t curve,
   (void)worker;
   search *s = user;
   const sonde_fit_plan *plan = &s->plan;
-  uint32_t probe = plan->curve_probe[curve], at = 0;
-  while (plan->site_index[at] != plan->curve_site[curve]) ++at;
-  const sonde_site *site = &s->sites->sites[plan->curve_site[curve]];
+  uint32_t probe = plan->curve_probe[curve];
   sonde_bonded bonded;
-  sonde_status status =
-      sonde_bonded_create_on(s->local[at], site, plan->half_u_m[probe], plan->half_v_m[probe], 1e-4,
-                             MOST_SOUGHT, &bonded, error);
+  sonde_status status = sonde_bonded_create_on(
+      s->local[sonde_plan_site_of(plan, curve)], &s->sites->sites[plan->curve_site[curve]],
+      plan->half_u_m[probe], plan->half_v_m[probe], 1e-4, MOST_SOUGHT, &bonded, error);
   if (status) return status;
-  double force_n = 0;
-  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
-    uint32_t row = plan->row[r];
-    if (!isnan(force_n) && !atomic_load(stop))
-      force_n = sonde_bonded_force(&bonded, s->rows.data[row].penetration_m);
-    s->to[row] = force_n;
-  }
+  status = sonde_bonded_curve(&bonded, plan, curve, s->rows.data, stop, s->to, error);
   sonde_bonded_clear(&bonded);
-  return SONDE_OK;
+  return status;
 }
 
 static sonde_status predict(search *s, const double *theta, double *force, double *cost,
@@ -148,31 +140,25 @@ static sonde_status linearise(void *user, double *cost, bool *done, sonde_error 
 static bool propose(void *user, double damping, double cost, bool *done) {
   search *s = user;
   uint32_t n = s->count, rows = s->rows.count;
-  double a[SONDE_BULK_PARAMETERS][SONDE_BULK_PARAMETERS + 1], longest = 0;
+  double a[SONDE_BULK_PARAMETERS * SONDE_BULK_PARAMETERS], step[SONDE_BULK_PARAMETERS] = {0};
+  double longest = 0;
   (void)cost;
   for (uint32_t i = 0; i < n; ++i) {
     const double *p = s->jacobian + (size_t)i * rows;
-    a[i][n] = 0;
-    for (uint32_t r = 0; r < rows; ++r) a[i][n] -= p[r] * (s->force[r] - s->rows.data[r].force_n);
+    for (uint32_t r = 0; r < rows; ++r) step[i] -= p[r] * (s->force[r] - s->rows.data[r].force_n);
     for (uint32_t j = 0; j < n; ++j) {
       const double *q = s->jacobian + (size_t)j * rows;
-      a[i][j] = 0;
-      for (uint32_t r = 0; r < rows; ++r) a[i][j] += p[r] * q[r];
+      a[i * n + j] = 0;
+      for (uint32_t r = 0; r < rows; ++r) a[i * n + j] += p[r] * q[r];
     }
+    a[i * n + i] = a[i * n + i] * (1 + damping) + 1e-9;
   }
-  for (uint32_t i = 0; i < n; ++i) a[i][i] = a[i][i] * (1 + damping) + 1e-9;
-  for (uint32_t i = 0; i < n; ++i) { // Gauss, no pivots: the matrix is positive definite
-    if (!(a[i][i] > 0)) return false;
-    for (uint32_t j = i + 1; j < n; ++j) {
-      double share = a[j][i] / a[i][i];
-      for (uint32_t c = i; c <= n; ++c) a[j][c] -= share * a[i][c];
-    }
-  }
-  for (uint32_t i = n; i-- > 0;) {
-    for (uint32_t c = i + 1; c < n; ++c) a[i][n] -= a[i][c] * a[c][n];
-    a[i][n] = clamp(a[i][n] / a[i][i], -1, 1);
-    s->trial[i] = s->theta[i] + a[i][n];
-    longest = fmax(longest, fabs(a[i][n]));
+  if (!sonde_cholesky(a, n)) return false;
+  sonde_cholesky_solve(a, n, step);
+  for (uint32_t i = 0; i < n; ++i) {
+    double move = clamp(step[i], -1, 1);
+    s->trial[i] = s->theta[i] + move;
+    longest = fmax(longest, fabs(move));
   }
   *done = longest < 1e-3;
   return true;
@@ -218,10 +204,9 @@ static sonde_status choose_rows(const sonde_site_table *sites, const sonde_measu
     taken[best] = true;
   }
   for (uint32_t c = 0; !status && c < plan.curve_count; ++c) {
-    uint32_t first = plan.curve_start[c], count = plan.curve_start[c + 1] - first, at = 0;
-    while (plan.site_index[at] != plan.curve_site[c]) ++at;
+    uint32_t first = plan.curve_start[c], count = plan.curve_start[c + 1] - first;
     uint32_t depths = options->depths < count ? options->depths : count, before = UINT32_MAX;
-    for (uint32_t k = 1; taken[at] && k <= depths; ++k) {
+    for (uint32_t k = 1; taken[sonde_plan_site_of(&plan, c)] && k <= depths; ++k) {
       uint32_t row = plan.row[first + count * k / depths - 1];
       if (row == before) continue;
       rows->data[rows->count] = m->data[row], rows->position_m[rows->count] = m->position_m[row];
@@ -282,9 +267,14 @@ static sonde_status build(const sonde_model_def *def, const sonde_fit_bulk_def *
                           sonde_model **model, double *worst_rad, sonde_error *error) {
   sonde_bulk_law law = sonde_bulk_law_default(options->kind);
   law.poisson = options->poisson;
-  const sonde_bulk_mesh mesh = {.edge_m = options->edge_m,
+  // K* is dense: a condensed solid has a coarser mesh.
+  bool condensed = options->kind == SONDE_CONDENSED_SOLID;
+  double edge_m = options->edge_m, fine_edge_m = options->fine_edge_m;
+  if (!(edge_m > 0)) edge_m = condensed ? 20e-3 : 15e-3;
+  if (!(fine_edge_m > 0)) fine_edge_m = condensed ? 10e-3 : 5e-3;
+  const sonde_bulk_mesh mesh = {.edge_m = edge_m,
                                 .growth = options->growth,
-                                .fine_edge_m = options->fine_edge_m,
+                                .fine_edge_m = fine_edge_m,
                                 .fine_reach_m = options->fine_reach_m};
   sonde_status status = sonde_def_check("fit_bulk", options->version, error);
   if (status) return status;

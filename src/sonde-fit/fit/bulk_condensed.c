@@ -3,23 +3,20 @@
 
 #include "elements/condense.h"
 #include "fit/press.h"
+#include "tissue/bulk/bulk.h"
 
 #include "base/clock.h"
 #include "base/maths.h"
+#include "base/order.h"
 
 #include <string.h>
 
-enum { MOST_SKIN = 2500, REPEATS = 15 };
+enum { REPEATS = 15 };
 
 typedef struct contact {
   uint32_t *places; // of the touched nodes in the condensed list
   double *u, *f, *skin_u, *full_f, *full_u;
 } contact;
-
-static int compare_times(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
 
 // Forces on the touched nodes and displacements of the skin, many times; medians.
 static sonde_status time_contact(const sonde_condensed *c, contact *at, uint32_t count,
@@ -39,8 +36,8 @@ static sonde_status time_contact(const sonde_condensed *c, contact *at, uint32_t
     }
     update_s[k] = sonde_clock_now() - start - forces_s[k];
   }
-  qsort(forces_s, REPEATS, sizeof *forces_s, compare_times);
-  qsort(update_s, REPEATS, sizeof *update_s, compare_times);
+  qsort(forces_s, REPEATS, sizeof *forces_s, sonde_compare_reals);
+  qsort(update_s, REPEATS, sizeof *update_s, sonde_compare_reals);
   cost->contact_s = forces_s[REPEATS / 2], cost->update_s = update_s[REPEATS / 2];
   return status;
 }
@@ -67,9 +64,9 @@ static sonde_status solve_whole(const sonde_elastic *elastic, const sonde_bonded
   return status;
 }
 
-static sonde_status measure(const sonde_model *model, sonde_bonded *bonded, double depth_m,
-                            uint32_t threads, const sonde_elastic *elastic, contact *at,
-                            sonde_condensed_cost *cost, sonde_error *error) {
+static sonde_status measure(sonde_bonded *bonded, double depth_m, uint32_t threads,
+                            const sonde_elastic *elastic, contact *at, sonde_condensed_cost *cost,
+                            sonde_error *error) {
   sonde_condensed *c = NULL;
   uint32_t count = bonded->held_count;
   double start = sonde_clock_now();
@@ -91,8 +88,11 @@ static sonde_status measure(const sonde_model *model, sonde_bonded *bonded, doub
                      at->f[3 * k + 2] * bonded->normal.z;
   if (!status) status = solve_whole(elastic, bonded, at, &cost->solve_difference, error);
   double engine_n = sonde_bonded_force(bonded, depth_m);
+  if (!status && isnan(engine_n))
+    status =
+        sonde_fail(error, SONDE_CONVERGENCE,
+                   "the engine finds no equilibrium of the whole solid at %g mm", 1e3 * depth_m);
   cost->engine_difference = fabs(engine_n / cost->force_n - 1);
-  SONDE_ASSERT(model->kind == SONDE_LINEAR_SOLID);
   sonde_condensed_destroy(c);
   return status;
 }
@@ -106,48 +106,24 @@ sonde_status sonde_condensed_measure(const sonde_model *model, const sonde_site 
     return sonde_fail(error, SONDE_ARGUMENT, "only a linear solid can be condensed");
   const sonde_bulk *bulk = model->bulk;
   uint32_t skin = model->surface.vertex_count, all = bulk->node_count + bulk->held_count;
-  if (skin > MOST_SKIN)
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "the skin has %u nodes, expected at most %d: K* would take %.1f GB", skin,
-                      MOST_SKIN, 72e-9 * skin * skin);
-  const sonde_tetrahedra mesh = {.node_count = all,
-                                 .count = bulk->element_count,
-                                 .surface_count = skin,
-                                 .node = bulk->node,
-                                 .corner = bulk->element};
-  uint8_t *held = SONDE_NEW(uint8_t, all);
-  uint32_t *last = SONDE_NEW(uint32_t, skin);
-  double *young = SONDE_NEW(double, bulk->element_count);
+  sonde_bulk_elastic solid;
+  sonde_status status = sonde_bulk_elastic_create(model, &solid, error);
+  if (status) return status;
   contact at = {SONDE_NEW(uint32_t, skin),           SONDE_NEW(double, 3 * (size_t)skin),
                 SONDE_NEW(double, 3 * (size_t)skin), SONDE_NEW(double, 3 * (size_t)skin),
                 SONDE_NEW(double, 3 * (size_t)all),  SONDE_NEW(double, 3 * (size_t)all)};
-  sonde_status status =
-      held && last && young && at.places && at.u && at.f && at.skin_u && at.full_f && at.full_u
-          ? SONDE_OK
-          : sonde_fail_memory(error);
-  sonde_elastic *elastic = NULL;
+  if (!at.places || !at.u || !at.f || !at.skin_u || !at.full_f || !at.full_u)
+    status = sonde_fail_memory(error);
   sonde_bonded bonded = {0};
-  if (!status) {
-    for (uint32_t i = bulk->node_count; i < all; ++i) held[i] = 7;
-    for (uint32_t i = 0; i < skin; ++i) last[i] = i;
-    for (uint32_t e = 0; e < bulk->element_count; ++e)
-      young[e] = bulk->law.stiffness_scale * bulk->law.young_pa[bulk->layer[e]];
-    const sonde_elastic_def def = {&mesh, held, last, skin, SONDE_DILATATION_ELEMENT};
-    status = sonde_elastic_create(&def, &elastic, error);
-  }
-  if (!status) status = sonde_elastic_set(elastic, young, bulk->law.poisson, 0, error);
   if (!status)
     status = sonde_bonded_create_on(model, site, half_u_m, half_v_m, 1e-8, 200, &bonded, error);
   if (!status) {
     cost->nodes = bulk->node_count, cost->skin_nodes = skin;
     cost->contact_nodes = bonded.held_count;
-    status = measure(model, &bonded, depth_m, threads, elastic, &at, cost, error);
+    status = measure(&bonded, depth_m, threads, solid.elastic, &at, cost, error);
     sonde_bonded_clear(&bonded);
   }
-  sonde_elastic_destroy(elastic);
-  sonde_free(held);
-  sonde_free(last);
-  sonde_free(young);
+  sonde_elastic_destroy(solid.elastic);
   void *arrays[] = {at.places, at.u, at.f, at.skin_u, at.full_f, at.full_u};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
   return status;

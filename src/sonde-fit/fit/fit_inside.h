@@ -42,6 +42,13 @@ typedef struct sonde_fit_plan {
   uint32_t excluded_curves, excluded_rows; // left out: row_count + excluded_rows measurements
 } sonde_fit_plan;
 
+// Which of the measured sites a curve is of.
+static inline uint32_t sonde_plan_site_of(const sonde_fit_plan *plan, uint32_t curve) {
+  uint32_t at = 0;
+  while (plan->site_index[at] != plan->curve_site[curve]) ++at;
+  return at;
+}
+
 enum { SONDE_FIT_LEAST_STEPS = 3 }; // positive penetrations of a curve that can be fitted
 
 // Sorts and checks the measurements for a prediction: every row counts.

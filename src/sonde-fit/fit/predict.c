@@ -34,16 +34,7 @@ static sonde_status predict_curve(void *user, uint32_t worker, uint32_t curve,
         sonde_bonded_create(p->model, site, plan->half_u_m[probe], plan->half_v_m[probe],
                             p->def->relative_residual, p->def->max_iterations, &bonded, error);
     if (status) return status;
-    double force_n = 0.0;
-    for (uint32_t r = first; r < end && !status; ++r) {
-      uint32_t row = plan->row[r];
-      if (atomic_load(stop)) {
-        status = sonde_fail(error, SONDE_CANCELLED, "cancelled");
-        break;
-      }
-      if (!isnan(force_n)) force_n = sonde_bonded_force(&bonded, p->m->data[row].penetration_m);
-      p->predicted_n[row] = force_n;
-    }
+    status = sonde_bonded_curve(&bonded, plan, curve, p->m->data, stop, p->predicted_n, error);
     sonde_bonded_clear(&bonded);
     return status;
   }

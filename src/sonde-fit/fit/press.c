@@ -123,6 +123,20 @@ double sonde_bonded_force(sonde_bonded *b, double depth_m) {
   return result.converged ? v_dot(force_n, b->normal) : NAN;
 }
 
+sonde_status sonde_bonded_curve(sonde_bonded *bonded, const sonde_fit_plan *plan, uint32_t curve,
+                                const sonde_datum *data, const atomic_bool *stop, double *force_n,
+                                sonde_error *error) {
+  SONDE_ASSERT(curve < plan->curve_count);
+  double force = 0;
+  for (uint32_t r = plan->curve_start[curve]; r < plan->curve_start[curve + 1]; ++r) {
+    uint32_t row = plan->row[r];
+    if (atomic_load(stop)) return sonde_fail(error, SONDE_CANCELLED, "cancelled");
+    if (!isnan(force)) force = sonde_bonded_force(bonded, data[row].penetration_m);
+    force_n[row] = force;
+  }
+  return SONDE_OK;
+}
+
 static sonde_pose probe_pose(const sonde_site *site, double depth_m) {
   sonde_vec3 z = v_neg(site->normal), x = site->u, y = v_cross(z, x);
   return (sonde_pose){v_madd(site->position_m, -depth_m, site->normal),

@@ -6,6 +6,8 @@
 #include "fit/fit_inside.h"
 #include "sonde/world.h"
 
+#include <stdatomic.h>
+
 // Scratch of one worker: a state of the model and positions of held nodes.
 typedef struct sonde_press {
   const sonde_model *model;
@@ -50,6 +52,12 @@ void sonde_bonded_clear(sonde_bonded *bonded);
 // Force along the normal with the held nodes moved by -depth normal, all others free; starts from
 // the last equilibrium. NaN when none is found.
 double sonde_bonded_force(sonde_bonded *bonded, double depth_m);
+
+// Those forces at the rows of a plan's curve, in its order, into force_n[measurements]; rows behind
+// a depth without equilibrium are NaN. @return CANCELLED
+sonde_status sonde_bonded_curve(sonde_bonded *bonded, const sonde_fit_plan *plan, uint32_t curve,
+                                const sonde_datum *data, const atomic_bool *stop, double *force_n,
+                                sonde_error *error);
 
 // Force along the normal with the convex body's face centred at the site moved by -to_m normal,
 // pressed on slowly from the equilibrium at from_m. NaN when no equilibrium is found.

@@ -207,7 +207,7 @@ static void read_model(const sonde_scene_source *source, sonde_place at, sonde_b
   sonde_nodes nodes = {0};
   if (!status) {
     nodes = sonde_model_nodes(*model);
-    pairs = solid ? sonde_bulk_pairs((*model)->bulk, NULL) : 0;
+    pairs = solid ? sonde_node_pairs(&nodes, NULL) : 0;
     status = sonde_body_allocate(body, nodes.count, pairs, &error);
   }
   if (!status && solid) {
@@ -222,7 +222,7 @@ static void read_model(const sonde_scene_source *source, sonde_place at, sonde_b
   memcpy(body->node, nodes.rest, nodes.count * sizeof *body->node);
   memcpy(body->node_mass_kg, nodes.mass_kg, nodes.count * sizeof *body->node_mass_kg);
   if (!solid) return;
-  sonde_bulk_pairs((*model)->bulk, body->pairs);
+  sonde_node_pairs(&nodes, body->pairs);
   for (uint32_t i = 0; i < skin; ++i) body->surface_node[i] = i;
 }
 
@@ -289,9 +289,10 @@ static void read_deformable(const sonde_scene_source *source, sonde_place at, so
     sum = v_madd(sum, body->node_mass_kg[i], body->node[i]);
   }
   body->mass = (sonde_mass){.mass_kg = mass, .centre_m = v_scale(sum, 1 / mass)};
-  uint32_t inner = body->solid ? body->node_count + body->solid->bulk->held_count : 0;
+  const sonde_bulk *bulk = body->solid ? body->solid->bulk : NULL;
+  uint32_t inner = bulk ? bulk->node_count + bulk->held_count : 0;
   for (uint32_t i = 0; i < inner; ++i) // those that the bone holds too
-    body->solid->bulk->node[i] = pose_apply(body->start, body->solid->bulk->node[i]);
+    bulk->node[i] = pose_apply(body->start, bulk->node[i]);
   for (uint32_t i = 0; body->model && i < body->node_count; ++i) {
     body->model->surface.vertices[i] = body->node[i];
     body->model->normal[i] = q_rotate(body->start.rotation, body->model->normal[i]);

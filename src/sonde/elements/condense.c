@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-static sonde_status allocate(const uint32_t *nodes, uint32_t count, bool stiffness,
+static sonde_status allocate(const uint32_t *nodes, uint32_t count, bool stiffness, bool compliance,
                              sonde_condensed **condensed, sonde_error *error) {
   sonde_condensed *c = *condensed = SONDE_NEW(sonde_condensed, 1);
   if (!c) return sonde_fail_memory(error);
@@ -16,8 +16,8 @@ static sonde_status allocate(const uint32_t *nodes, uint32_t count, bool stiffne
   c->count = count;
   c->node = SONDE_NEW(uint32_t, count);
   c->stiffness = stiffness ? SONDE_NEW(double, side *side) : NULL;
-  c->compliance = SONDE_NEW(double, side *side);
-  if (c->node && c->compliance && (c->stiffness || !stiffness)) {
+  c->compliance = compliance ? SONDE_NEW(double, side *side) : NULL;
+  if (c->node && (c->compliance || !compliance) && (c->stiffness || !stiffness)) {
     memcpy(c->node, nodes, count * sizeof *nodes);
     return SONDE_OK;
   }
@@ -63,9 +63,9 @@ static sonde_status condense(const sonde_elastic *e, sonde_condensed *c, double 
   return status;
 }
 
-sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
-                                    sonde_condensed **condensed, sonde_condensed_times *times,
-                                    sonde_error *error) {
+static sonde_status create(const sonde_elastic *e, uint32_t workers, bool invert,
+                           sonde_condensed **condensed, sonde_condensed_times *times,
+                           sonde_error *error) {
   SONDE_ASSERT(e != NULL && condensed != NULL);
   *condensed = NULL;
   const uint32_t *nodes = e->node + (e->count - e->last_count);
@@ -78,9 +78,9 @@ sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
   sonde_condensed_times ignored;
   if (!times) times = &ignored;
   double start = sonde_clock_now();
-  sonde_status status = allocate(nodes, e->last_count, true, condensed, error);
+  sonde_status status = allocate(nodes, e->last_count, true, invert, condensed, error);
   if (!status) status = condense(e, *condensed, start, times, error);
-  if (!status)
+  if (!status && invert)
     status = sonde_invert((*condensed)->stiffness, 3 * e->last_count, workers,
                           (*condensed)->compliance, error);
   times->inverse_s = sonde_clock_now() - start - times->analysis_s - times->factor_s;
@@ -91,11 +91,22 @@ sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
   return status;
 }
 
+sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
+                                    sonde_condensed **condensed, sonde_condensed_times *times,
+                                    sonde_error *error) {
+  return create(e, workers, true, condensed, times, error);
+}
+
+sonde_status sonde_condensed_stiffness(const sonde_elastic *e, sonde_condensed **condensed,
+                                       sonde_error *error) {
+  return create(e, 0, false, condensed, NULL, error);
+}
+
 sonde_status sonde_condensed_of_nodes(const sonde_elastic *e, const uint32_t *nodes, uint32_t count,
                                       uint32_t workers, sonde_condensed **condensed,
                                       sonde_error *error) {
   SONDE_ASSERT(e != NULL && nodes != NULL && condensed != NULL);
-  sonde_status status = allocate(nodes, count, false, condensed, error);
+  sonde_status status = allocate(nodes, count, false, true, condensed, error);
   if (!status)
     status = sonde_elastic_compliance(e, nodes, count, workers, (*condensed)->compliance, error);
   if (status) {

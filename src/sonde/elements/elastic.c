@@ -31,13 +31,6 @@ static void add_block(sonde_elastic *e, uint32_t row, uint32_t column, double we
     }
 }
 
-// Stiffness of one tetrahedron at rest without what lambda adds.
-static void element_matrix(const sonde_elastic *e, uint32_t t, double young_pa, double k[12][12]) {
-  static const double rest[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  tetrahedron_stiffness(SONDE_LINEAR, sonde_shear_modulus(young_pa, e->poisson), 0, rest,
-                        (const double(*)[3])e->gradient[t], e->volume[t], k);
-}
-
 // Mean volume change of a patch per displacement of the nodes listed: b[count]. Returns count.
 // place [node_count] is UINT32_MAX throughout, before and after.
 static uint32_t mean_dilatation(const sonde_elastic *e, uint32_t patch, uint32_t *place,
@@ -98,9 +91,12 @@ static void add_pair(sonde_elastic *e, uint32_t node_a, uint32_t node_b, const d
 static sonde_status assemble(sonde_elastic *e, sonde_error *error) {
   const sonde_tetrahedra *m = e->mesh;
   memset(e->value, 0, 9 * (size_t)e->row_start[e->count] * sizeof *e->value);
+  // Tetrahedra at rest without what lambda adds.
+  static const double rest[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   for (uint32_t t = 0; t < m->count; ++t) {
     double k[12][12];
-    element_matrix(e, t, e->young_pa[t], k);
+    tetrahedron_stiffness(SONDE_LINEAR, sonde_shear_modulus(e->young_pa[t], e->poisson), 0, rest,
+                          (const double(*)[3])e->gradient[t], e->volume[t], k);
     for (int a = 0; a < 4; ++a)
       for (int b = 0; b < 4; ++b)
         add_pair(e, m->corner[t][a], m->corner[t][b], &k[3 * a][3 * b], 12);
@@ -336,64 +332,4 @@ sonde_status sonde_elastic_compliance(const sonde_elastic *e, const uint32_t *no
   sonde_free(c.scratch);
   sonde_free(c.vectors);
   return status;
-}
-
-// ---- sensitivity --------------------------------------------------------------------------
-
-static sonde_vec3 moved(const sonde_elastic *e, const double *u, uint32_t node) {
-  uint32_t at = e->unknown[node];
-  return at == UINT32_MAX ? vec3(0, 0, 0)
-                          : vec3(u[3 * (size_t)at], u[3 * (size_t)at + 1], u[3 * (size_t)at + 2]);
-}
-
-// u . k u over some nodes.
-static double work_of(const sonde_elastic *e, const double *u, const uint32_t *nodes, int count,
-                      const double *k) {
-  double x[12], sum = 0;
-  for (int c = 0; c < count; ++c) {
-    sonde_vec3 d = moved(e, u, nodes[c]);
-    x[3 * c] = d.x, x[3 * c + 1] = d.y, x[3 * c + 2] = d.z;
-  }
-  for (int i = 0; i < 3 * count; ++i)
-    for (int j = 0; j < 3 * count; ++j) sum += x[i] * k[3 * count * i + j] * x[j];
-  return sum;
-}
-
-void sonde_elastic_sensitivity(const sonde_elastic *e, const double *u, const uint32_t *group,
-                               uint32_t group_count, double *derivative) {
-  SONDE_ASSERT(e != NULL && u != NULL && group != NULL && derivative != NULL);
-  const sonde_tetrahedra *m = e->mesh;
-  memset(derivative, 0, (group_count + 1) * sizeof *derivative);
-  // The stiffness of a tetrahedron is proportional to its modulus.
-  for (uint32_t t = 0; t < m->count; ++t) {
-    double k[12][12];
-    SONDE_ASSERT(group[t] < group_count);
-    element_matrix(e, t, e->young_pa[t], k);
-    derivative[group[t]] += work_of(e, u, m->corner[t], 4, &k[0][0]);
-  }
-  for (uint32_t f = 0; f < m->outer_face_count && e->skin_n_m > 0; ++f) {
-    double k[9][9];
-    membrane_matrix(e, f, e->skin_n_m, k);
-    derivative[group_count] += work_of(e, u, m->boundary.faces[f], 3, &k[0][0]);
-  }
-  if (!(e->poisson > 0)) return;
-  // lambda of a patch is the harmonic mean: d ln lambda = lambda sum of shares / lambda_t d ln E_t.
-  const sonde_patches *p = &e->patches;
-  for (uint32_t i = 0; i < p->count; ++i) {
-    double growth = 0;
-    for (uint32_t k = p->start[i]; k < p->start[i + 1]; ++k) {
-      uint32_t t = p->list[k];
-      for (int c = 0; c < 4; ++c) {
-        const double *g = e->gradient[t][c];
-        growth += p->share * e->volume[t] / p->volume[i] *
-                  v_dot(vec3(g[0], g[1], g[2]), moved(e, u, m->corner[t][c]));
-      }
-    }
-    double work = e->patch_lambda[i] * p->volume[i] * growth * growth;
-    for (uint32_t k = p->start[i]; k < p->start[i + 1]; ++k) {
-      uint32_t t = p->list[k];
-      derivative[group[t]] += work * e->patch_lambda[i] * p->share * e->volume[t] / p->volume[i] /
-                              sonde_lame_lambda(e->young_pa[t], e->poisson);
-    }
-  }
 }

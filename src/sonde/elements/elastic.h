@@ -73,10 +73,5 @@ SONDE_LINK sonde_status sonde_elastic_solve(const sonde_elastic *elastic,
 sonde_status sonde_elastic_compliance(const sonde_elastic *elastic, const uint32_t *nodes,
                                       uint32_t node_count, uint32_t workers, double *compliance,
                                       sonde_error *error);
-// Derivatives of u.K u with respect to the logarithm of Young's modulus of each group (of
-// group[tetrahedron] < group_count, with the skin last: group_count + 1 numbers). For imposed
-// displacements u.K u is the work of their forces, and its derivative this one.
-void sonde_elastic_sensitivity(const sonde_elastic *elastic, const double *u, const uint32_t *group,
-                               uint32_t group_count, double *derivative);
 
 #endif

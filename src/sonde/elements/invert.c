@@ -91,26 +91,6 @@ static sonde_status update_row(void *user, uint32_t worker, uint32_t item, const
   }
   return SONDE_OK;
 }
-
-// x_k = L_kk^-1 x_k or L_kk^-T x_k of a tile of `columns` columns.
-static void solve_diagonal(const inversion *v, uint32_t k, bool transposed, double *x,
-                           uint32_t columns, double *copy) {
-  const uint32_t size = size_of(v, k);
-  memcpy(copy, x, (size_t)size * columns * sizeof *copy);
-  memset(x, 0, (size_t)size * columns * sizeof *x);
-  const sonde_product product = {.c = x,
-                                 .c_row = columns,
-                                 .a = v->diagonal + (size_t)k * TILE * TILE,
-                                 .a_row = transposed ? 1 : size,
-                                 .a_step = transposed ? size : 1,
-                                 .b = copy,
-                                 .b_row = columns,
-                                 .rows = size,
-                                 .columns = columns,
-                                 .depth = size};
-  sonde_multiply(&product);
-}
-
 // One column of tiles of the inverse from the diagonal down, and the row that mirrors it.
 static sonde_status invert_column(void *user, uint32_t worker, uint32_t item,
                                   const atomic_bool *stop, sonde_error *error) {
@@ -125,7 +105,20 @@ static sonde_status invert_column(void *user, uint32_t worker, uint32_t item,
     for (uint32_t step = item; step < v->tiles; ++step) {
       const uint32_t k = pass ? v->tiles - 1 - (step - item) : step, size = size_of(v, k);
       double *now = x + (size_t)(k - item) * TILE * columns;
-      solve_diagonal(v, k, pass, now, columns, copy);
+      // x_k = L_kk^-1 x_k, on the way back L_kk^-T x_k.
+      memcpy(copy, now, (size_t)size * columns * sizeof *copy);
+      memset(now, 0, (size_t)size * columns * sizeof *now);
+      const sonde_product diagonal = {.c = now,
+                                      .c_row = columns,
+                                      .a = v->diagonal + (size_t)k * TILE * TILE,
+                                      .a_row = pass ? 1 : size,
+                                      .a_step = pass ? size : 1,
+                                      .b = copy,
+                                      .b_row = columns,
+                                      .rows = size,
+                                      .columns = columns,
+                                      .depth = size};
+      sonde_multiply(&diagonal);
       const uint32_t behind = k * TILE + size;
       const sonde_product product = {
           .c = pass ? x : now + (size_t)size * columns,

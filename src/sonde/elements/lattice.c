@@ -122,17 +122,6 @@ static void add_tetrahedron(builder *b, place p, place q, place r, place s) {
   memcpy(l->corner[l->count++], corner, sizeof corner);
 }
 
-// One or, where smaller cells halve the side a-b, two tetrahedra.
-static void add_beside(builder *b, place top, place bottom, place a, place e) {
-  place middle = middle_of(a, e);
-  if (sonde_index_map_find(&b->map, key_of(middle)) == UINT32_MAX) {
-    add_tetrahedron(b, top, bottom, a, e);
-    return;
-  }
-  add_tetrahedron(b, top, bottom, a, middle);
-  add_tetrahedron(b, top, bottom, middle, e);
-}
-
 static place centre_of(const sonde_cell *c) {
   return (place){{c->x + c->side / 2, c->y + c->side / 2, c->z + c->side / 2}};
 }
@@ -161,8 +150,13 @@ static void add_face(builder *b, uint32_t at, int axis, bool positive) {
   face_corners(c, axis, positive, corner);
   if (o->side == c->side && o->child == 0) {
     place opposite = centre_of(o);
-    for (int k = 0; positive && k < 4; ++k)
-      add_beside(b, centre, opposite, corner[k], corner[(k + 1) % 4]);
+    for (int k = 0; positive && k < 4; ++k) {
+      // One tetrahedron, or two where smaller cells halve the side.
+      place from = corner[k], to = corner[(k + 1) % 4], middle = middle_of(from, to);
+      bool halved = sonde_index_map_find(&b->map, key_of(middle)) != UINT32_MAX;
+      add_tetrahedron(b, centre, opposite, from, halved ? middle : to);
+      if (halved) add_tetrahedron(b, centre, opposite, middle, to);
+    }
   } else if (o->side == c->side) {
     // Four smaller faces on the other side.
     place middle = middle_of(corner[0], corner[2]);

@@ -189,19 +189,6 @@ typedef struct output {
   bool mirrored; // the points of the lattice tetrahedron at work are listed left-handed
 } output;
 
-static uint32_t node_of_point(output *o, uint32_t point) {
-  stuffing *s = o->s;
-  if (s->node[point] == UINT32_MAX) {
-    uint32_t node = s->node[point] = o->t->node_count++;
-    bool surface = s->distance[point] == 0;
-    o->t->node[node] = s->point[point];
-    o->kind[node] = !surface             ? SONDE_NODE_INSIDE
-                    : s->on_inner[point] ? SONDE_NODE_INNER
-                                         : SONDE_NODE_OUTER;
-  }
-  return s->node[point];
-}
-
 // Node where the edge from an inside to an outside point crosses the surface.
 static uint32_t node_of_edge(output *o, uint32_t inside, uint32_t outside) {
   uint32_t number = sonde_index_map_find(&o->s->edges, edge_key(inside, outside));
@@ -232,7 +219,16 @@ static void add_pyramid(output *o, uint32_t apex, uint32_t a, uint32_t b, uint32
 // two lattice tetrahedra is split from the lower of its inside points, on either side.
 static void add_inside(output *o, const uint32_t p[4], int in, int on) {
   uint32_t n[4];
-  for (int k = 0; k < in + on; ++k) n[k] = node_of_point(o, p[k]);
+  for (int k = 0; k < in + on; ++k) {
+    uint32_t *node = &o->s->node[p[k]];
+    if (*node == UINT32_MAX) {
+      *node = o->t->node_count++;
+      bool surface = o->s->distance[p[k]] == 0, inner = o->s->on_inner[p[k]];
+      o->t->node[*node] = o->s->point[p[k]];
+      o->kind[*node] = !surface ? SONDE_NODE_INSIDE : inner ? SONDE_NODE_INNER : SONDE_NODE_OUTER;
+    }
+    n[k] = *node;
+  }
   if (in + on == 4) {
     add(o, n[0], n[1], n[2], n[3]);
   } else if (in == 1) {

@@ -10,7 +10,6 @@
 typedef enum sonde_family { SONDE_FAMILY_TWO_LAYER, SONDE_FAMILY_BULK } sonde_family;
 
 typedef struct sonde_kind {
-  const char *name;
   sonde_family family;
   sonde_nodes (*nodes)(const sonde_model *model);
   // NULL: every move is as good as another.
@@ -18,7 +17,7 @@ typedef struct sonde_kind {
 } sonde_kind;
 
 extern const sonde_kind sonde_two_layer_kind, sonde_lattice_kind, sonde_three_layer_kind,
-    sonde_linear_solid_kind, sonde_neo_hookean_kind;
+    sonde_linear_solid_kind, sonde_neo_hookean_kind, sonde_condensed_kind;
 
 // @thread any
 sonde_family sonde_model_family(const sonde_model *model);

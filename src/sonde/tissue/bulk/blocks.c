@@ -10,8 +10,9 @@ sonde_status sonde_bulk_blocks_create(const sonde_model *model, sonde_bulk_block
   *out = NULL;
   sonde_bulk_blocks *b = SONDE_NEW(sonde_bulk_blocks, 1);
   if (!b) return sonde_fail_memory(error);
+  const sonde_nodes nodes = sonde_model_nodes(model);
   b->model = model;
-  b->batch_count = sonde_vectors_of(model->bulk->node_count);
+  b->batch_count = sonde_vectors_of(nodes.count);
   size_t rows = (size_t)b->batch_count * SONDE_BATCH;
   b->block = sonde_calloc(1, b->batch_count * sizeof *b->rows +
                                  (rows + 1) * SONDE_RECORD * sizeof(real) + 63);
@@ -20,8 +21,7 @@ sonde_status sonde_bulk_blocks_create(const sonde_model *model, sonde_bulk_block
   if (!status) {
     b->rows = (void *)sonde_whole_lines(b->block);
     b->place = (real *)(void *)(b->rows + b->batch_count);
-    const sonde_layout layout = {
-        .nodes = sonde_model_nodes(model), .batch_count = b->batch_count, .part_count = 1};
+    const sonde_layout layout = {.nodes = nodes, .batch_count = b->batch_count, .part_count = 1};
     const sonde_step_scales step = {.stiffness_scale = 1};
     status = sonde_bulk_calls.create(model, &layout, &step, b->rows, &b->tissue, error);
   }
@@ -42,12 +42,12 @@ void sonde_bulk_blocks_destroy(sonde_bulk_blocks *blocks) {
   sonde_free(blocks);
 }
 
-uint32_t sonde_bulk_pairs(const sonde_bulk *bulk, uint32_t (*pairs)[2]) {
+uint32_t sonde_node_pairs(const sonde_nodes *nodes, uint32_t (*pairs)[2]) {
   uint32_t count = 0;
-  for (uint32_t i = 0; i < bulk->node_count; ++i)
-    for (uint32_t k = bulk->start[i]; k < bulk->start[i + 1]; ++k) {
-      if (bulk->neighbour[k] < i) continue;
-      if (pairs) pairs[count][0] = i, pairs[count][1] = bulk->neighbour[k];
+  for (uint32_t i = 0; i < nodes->count; ++i)
+    for (uint32_t k = nodes->start[i]; k < nodes->start[i + 1]; ++k) {
+      if (nodes->neighbour[k] < i) continue;
+      if (pairs) pairs[count][0] = i, pairs[count][1] = nodes->neighbour[k];
       ++count;
     }
   return count;

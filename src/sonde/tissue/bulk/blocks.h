@@ -4,6 +4,7 @@
 #ifndef SONDE_SRC_BULK_BLOCKS_H
 #define SONDE_SRC_BULK_BLOCKS_H
 
+#include "tissue/nodes.h"
 #include "tissue/two_layer/linearise.h"
 
 typedef struct sonde_bulk_blocks sonde_bulk_blocks;
@@ -14,7 +15,7 @@ SONDE_LINK sonde_status sonde_bulk_blocks_create(const sonde_model *model,
 SONDE_LINK void sonde_bulk_blocks_destroy(sonde_bulk_blocks *blocks);
 // Pairs of moving nodes that forces couple, i < j in ascending order: how many, and, where `pairs`
 // is not NULL, which. @thread any
-SONDE_LINK uint32_t sonde_bulk_pairs(const sonde_bulk *bulk, uint32_t (*pairs)[2]);
+SONDE_LINK uint32_t sonde_node_pairs(const sonde_nodes *nodes, uint32_t (*pairs)[2]);
 
 // As sonde_tissue_linearise, of all moving nodes; the pairs of `matrix` are those above.
 // @thread tick

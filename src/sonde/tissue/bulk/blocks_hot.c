@@ -12,8 +12,8 @@ void sonde_bulk_linearise(sonde_bulk_blocks *blocks, const sonde_vec3 *position,
                           sonde_block_matrix *matrix) {
   const sonde_bulk *bulk = blocks->model->bulk;
   bulk_tissue *tissue = bulk_of(blocks->tissue);
-  uint32_t n = bulk->node_count, pair = 0;
-  SONDE_ASSERT(matrix->row_count == n);
+  uint32_t n = matrix->row_count, pair = 0;
+  SONDE_ASSERT(n <= bulk->node_count && sonde_vectors_of(n) == blocks->batch_count);
   for (uint32_t i = 0; i < n; ++i) {
     real *record = blocks->place + (size_t)i * SONDE_RECORD;
     sonde_vec3 u = v_sub(position[i], bulk->node[i]);

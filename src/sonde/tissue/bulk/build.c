@@ -124,5 +124,7 @@ sonde_status sonde_bulk_refine_at(const sonde_model *model, sonde_vec3 place_m, 
   def.skin = &model->surface, def.femur = &model->femur;
   def.sites = model->sites, def.site_count = model->site_count;
   def.law = model->law;
-  return build(&def, &tetrahedra, model, model->kind, &model->bulk->law, local, NULL, error);
+  // A condensed solid is the linear one, whose matrix is sparse.
+  sonde_model_kind kind = model->kind == SONDE_CONDENSED_SOLID ? SONDE_LINEAR_SOLID : model->kind;
+  return build(&def, &tetrahedra, model, kind, &model->bulk->law, local, NULL, error);
 }

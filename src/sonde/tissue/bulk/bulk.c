@@ -5,6 +5,7 @@
 #include "base/maths.h"
 #include "base/morton.h"
 #include "geometry/internal.h"
+#include "tissue/nodes.h"
 
 #include <string.h>
 
@@ -41,7 +42,7 @@ static sonde_status check_law(sonde_model_kind kind, const sonde_bulk_law *law,
                {"young_pa of muscle", law->young_pa[SONDE_LAYER_MUSCLE], 0, 1e12},
                {"poisson", law->poisson, 0, 0.4999},
                {"stiffness_scale", law->stiffness_scale, 1e-6, 1e6}};
-  if (kind == SONDE_TWO_LAYER || kind > SONDE_NEO_HOOKEAN_SOLID)
+  if (kind == SONDE_TWO_LAYER || kind > SONDE_CONDENSED_SOLID)
     return sonde_fail(error, SONDE_ARGUMENT, "model kind %d is not volumetric", (int)kind);
   for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
     if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
@@ -171,6 +172,7 @@ sonde_status sonde_bulk_derive(sonde_bulk *bulk, const sonde_model *model, sonde
   for (uint32_t i = 0; i < n; ++i)
     if (!(bulk->mass_kg[i] > 0))
       return sonde_fail(error, SONDE_MESH, "node %u belongs to no tetrahedron", i);
+  if (model->kind == SONDE_CONDENSED_SOLID) return sonde_bulk_derive_skin(bulk, model, error);
   return find_neighbours(bulk, n, n, &bulk->start, &bulk->neighbour, error);
 }
 
@@ -253,14 +255,17 @@ sonde_status sonde_model_fill(sonde_model *model, const sonde_tetrahedra *solid,
     bulk->layer[e] = hit.distance_m < fat ? SONDE_LAYER_FAT : SONDE_LAYER_MUSCLE;
   }
   sonde_surface_index_destroy(index);
+  sonde_model_kind before = model->kind;
+  model->kind = kind;
   if (!status) status = sonde_bulk_derive(bulk, model, error);
   sonde_free(rank);
   if (status) {
+    model->kind = before;
     sonde_bulk_destroy(bulk);
     return status;
   }
   sonde_bulk_destroy(model->bulk);
-  model->bulk = bulk, model->kind = kind;
+  model->bulk = bulk;
   return SONDE_OK;
 }
 
@@ -332,17 +337,28 @@ static void add_solids(const sonde_model *model, sonde_bulk_graph *graph) {
 sonde_status sonde_bulk_graph_create(const sonde_model *model, sonde_bulk_graph *graph,
                                      sonde_error *error) {
   const sonde_bulk *bulk = model->bulk;
-  uint32_t n = bulk->node_count, all = n + bulk->held_count;
+  bool condensed = model->kind == SONDE_CONDENSED_SOLID;
+  uint32_t n = sonde_model_nodes(model).count, all = bulk->node_count + bulk->held_count;
   bool springs = model->kind == SONDE_LATTICE || model->kind == SONDE_THREE_LAYER;
+  bool blocks = model->kind == SONDE_LINEAR_SOLID || condensed;
   *graph = (sonde_bulk_graph){0};
-  sonde_status status = find_neighbours(bulk, n, all, &graph->start, &graph->neighbour, error);
+  sonde_status status = SONDE_OK;
+  if (condensed) {
+    graph->start = SONDE_NEW(uint32_t, (size_t)n + 1);
+    graph->neighbour = SONDE_NEW(uint32_t, bulk->start[n]);
+    if (!graph->start || !graph->neighbour) status = sonde_fail_memory(error);
+    if (!status) {
+      memcpy(graph->start, bulk->start, ((size_t)n + 1) * sizeof *graph->start);
+      memcpy(graph->neighbour, bulk->neighbour, bulk->start[n] * sizeof *graph->neighbour);
+    }
+  } else
+    status = find_neighbours(bulk, n, all, &graph->start, &graph->neighbour, error);
   if (!status) {
     size_t slots = graph->start[n];
     graph->own = SONDE_NEW(sonde_mat3, n);
     if (springs) graph->spring = SONDE_NEW(sonde_bulk_spring, slots);
-    if (model->kind == SONDE_LINEAR_SOLID) graph->block = SONDE_NEW(sonde_mat3, slots);
-    if (!graph->own || (springs && !graph->spring) ||
-        (model->kind == SONDE_LINEAR_SOLID && !graph->block))
+    if (blocks) graph->block = SONDE_NEW(sonde_mat3, slots);
+    if (!graph->own || (springs && !graph->spring) || (blocks && !graph->block))
       status = sonde_fail_memory(error);
   }
   if (!status && springs) {
@@ -369,7 +385,8 @@ sonde_status sonde_bulk_graph_create(const sonde_model *model, sonde_bulk_graph 
             m_add(graph->own[i], m_rank1(v_unit(d, d), graph->spring[k].stiffness_n_m, 0));
       }
   }
-  if (!status && model->kind != SONDE_LATTICE) add_solids(model, graph);
+  if (!status && condensed) status = sonde_bulk_condense(model, graph, error);
+  if (!status && !condensed && model->kind != SONDE_LATTICE) add_solids(model, graph);
   if (status) sonde_bulk_graph_clear(graph);
   return status;
 }

@@ -4,7 +4,7 @@
 #define SONDE_SRC_BULK_H
 
 #include "base/link.h"
-#include "elements/tetrahedra.h"
+#include "elements/elastic.h"
 #include "sonde/tissue.h"
 
 // Defaults of a kind: moduli of a thigh, incompressible within a part of a hundred.
@@ -62,6 +62,20 @@ void sonde_bulk_graph_clear(sonde_bulk_graph *graph);
 // Elastic energy of the moving nodes' places, J. @thread any
 double sonde_bulk_graph_energy(const sonde_model *model, const sonde_bulk_graph *graph,
                                const sonde_vec3 *position);
+
+// The elastic solid of a linear or condensed model, its skin last, for condensing.
+typedef struct sonde_bulk_elastic {
+  sonde_tetrahedra mesh; // borrows the model's arrays
+  sonde_elastic *elastic;
+} sonde_bulk_elastic;
+// @return ARGUMENT for a skin of more than 2,500 nodes; CONVERGENCE @thread owner
+SONDE_LINK sonde_status sonde_bulk_elastic_create(const sonde_model *model,
+                                                  sonde_bulk_elastic *solid, sonde_error *error);
+// K* into the blocks of a condensed model's graph, whose neighbours are there. @thread owner
+sonde_status sonde_bulk_condense(const sonde_model *model, sonde_bulk_graph *graph,
+                                 sonde_error *error);
+// Masses and neighbours of a condensed model from those of the whole solid. @thread owner
+sonde_status sonde_bulk_derive_skin(sonde_bulk *bulk, const sonde_model *model, sonde_error *error);
 
 // Whether tetrahedra of a kind carry stress themselves.
 bool sonde_bulk_is_solid(const sonde_model *model);

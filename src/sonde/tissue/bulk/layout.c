@@ -83,7 +83,7 @@ static void destroy(sonde_tissue *data) {
 static void fill(bulk_tissue *tissue, const sonde_model *model, const sonde_layout *layout,
                  const sonde_bulk_graph *graph, sonde_rows *rows, uint32_t *corners) {
   const sonde_bulk *bulk = model->bulk;
-  uint32_t n = bulk->node_count;
+  uint32_t n = layout->nodes.count;
   for (uint32_t i = 0; i < layout->batch_count * SONDE_BATCH; ++i)
     fill_row(tissue, bulk, layout, graph, i);
   for (uint32_t s = 0; s < layout->batch_count; ++s)
@@ -115,9 +115,10 @@ static sonde_status create(const sonde_model *model, const sonde_layout *layout,
   const sonde_bulk *bulk = model->bulk;
   uint32_t batches = layout->batch_count;
   (void)step;
-  SONDE_ASSERT(bulk && bulk->node_count == layout->nodes.count);
+  uint32_t n = layout->nodes.count;
+  SONDE_ASSERT(bulk && n <= bulk->node_count);
   bulk_tissue *tissue = SONDE_NEW(bulk_tissue, 1);
-  uint32_t *corners = SONDE_NEW(uint32_t, bulk->node_count);
+  uint32_t *corners = SONDE_NEW(uint32_t, n);
   char *room = sonde_calloc(batches + 1, sizeof(bulk_batch));
   bulk_batch *size = (void *)sonde_whole_lines(room);
   sonde_bulk_graph graph = {0};
@@ -134,8 +135,8 @@ static sonde_status create(const sonde_model *model, const sonde_layout *layout,
     // Counts of slots and corners per batch, and their sums.
     for (uint32_t e = 0; tissue->solid && e < bulk->element_count; ++e)
       for (int c = 0; c < 4; ++c)
-        if (bulk->element[e][c] < bulk->node_count) ++corners[bulk->element[e][c]];
-    for (uint32_t i = 0; i < bulk->node_count; ++i) {
+        if (bulk->element[e][c] < n) ++corners[bulk->element[e][c]];
+    for (uint32_t i = 0; i < n; ++i) {
       bulk_batch *at = &size[i / SONDE_BATCH];
       uint32_t slots = graph.start[i + 1] - graph.start[i];
       at->slot_count = slots > at->slot_count ? slots : at->slot_count;

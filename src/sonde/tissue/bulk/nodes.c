@@ -15,6 +15,13 @@ static sonde_nodes nodes(const sonde_model *model) {
                        .neighbour = bulk->neighbour};
 }
 
+// Inner nodes follow those of the skin.
+static sonde_nodes skin_nodes(const sonde_model *model) {
+  sonde_nodes all = nodes(model);
+  all.count = model->surface.vertex_count;
+  return all;
+}
+
 // A third of the shortest edge, so that tetrahedra do not turn inside out.
 static sonde_vec3 bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 u,
                                sonde_vec3 move) {
@@ -24,7 +31,8 @@ static sonde_vec3 bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 
   return size > most ? v_scale(move, most / size) : move;
 }
 
-const sonde_kind sonde_lattice_kind = {"laffont", SONDE_FAMILY_BULK, nodes, NULL};
-const sonde_kind sonde_three_layer_kind = {"lee", SONDE_FAMILY_BULK, nodes, bounded_move};
-const sonde_kind sonde_linear_solid_kind = {"linear", SONDE_FAMILY_BULK, nodes, NULL};
-const sonde_kind sonde_neo_hookean_kind = {"neo-hookean", SONDE_FAMILY_BULK, nodes, bounded_move};
+const sonde_kind sonde_lattice_kind = {SONDE_FAMILY_BULK, nodes, NULL};
+const sonde_kind sonde_three_layer_kind = {SONDE_FAMILY_BULK, nodes, bounded_move};
+const sonde_kind sonde_linear_solid_kind = {SONDE_FAMILY_BULK, nodes, NULL};
+const sonde_kind sonde_neo_hookean_kind = {SONDE_FAMILY_BULK, nodes, bounded_move};
+const sonde_kind sonde_condensed_kind = {SONDE_FAMILY_BULK, skin_nodes, NULL};

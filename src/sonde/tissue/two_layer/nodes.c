@@ -22,4 +22,4 @@ static sonde_vec3 bounded_move(const sonde_model *model, uint32_t i, sonde_vec3 
   return over > 0 ? v_madd(move, over, n) : move;
 }
 
-const sonde_kind sonde_two_layer_kind = {"two-layer", SONDE_FAMILY_TWO_LAYER, nodes, bounded_move};
+const sonde_kind sonde_two_layer_kind = {SONDE_FAMILY_TWO_LAYER, nodes, bounded_move};
