@@ -11,7 +11,7 @@
 #include <string.h>
 
 enum { SIDE = 360, SHADES = 32 };
-static const double SHOWN_N = 20;
+static const double SHOWN_N = 8;
 
 // A slow press along the beam from the skin at rest, to a force or a depth.
 static sonde_status press(const paper *p, settled *s, sonde_pose start, double depth_m,
