@@ -103,7 +103,7 @@ static void the_vein_closes_before_the_artery(void **state) {
   bench b = make();
   double at[2];
   sonde_vessel_state artery;
-  press(&b, "healthy", 0, 16, at);
+  press(&b, "healthy", 0, 4, at);
   assert_true(sonde_interior_vessel_at_plane(b.interior, 1, b.press.pose, &artery));
   print_message("vein %.3f, artery %.3f, of the model %.3f\n", at[0], at[1], artery.area_ratio);
   assert_true(at[0] < 0.15);
@@ -117,9 +117,9 @@ static void a_fuller_vein_closes_later(void **state) {
   (void)state;
   bench b = make();
   double before = 0;
-  for (double mmhg = 5; mmhg < 90; mmhg += 20) {
+  for (double mmhg = 10; mmhg < 90; mmhg += 20) {
     double at[2];
-    press(&b, "healthy", mmhg, 12, at);
+    press(&b, "healthy", mmhg, 6, at);
     print_message("%2.0f mmHg: vein %.3f, artery %.3f\n", mmhg, at[0], at[1]);
     assert_true(at[0] >= before);
     before = at[0];
@@ -137,7 +137,7 @@ static void residual_area_grows_with_the_stage(void **state) {
   for (int k = 0; k < 5; ++k) {
     double rest[2], at[2];
     press(&b, stages[k], 0, 0, rest);
-    press(&b, stages[k], 0, 20, at);
+    press(&b, stages[k], 0, 8, at);
     double residual = at[0] / rest[0];
     print_message("%s: residual %.3f\n", stages[k], residual);
     assert_true(residual > before);
@@ -150,7 +150,7 @@ static void residual_area_grows_with_the_stage(void **state) {
 static void the_picture_shows_the_models_area(void **state) {
   (void)state;
   bench b = make();
-  for (double push_n = 0; push_n < 15; push_n += 4) {
+  for (double push_n = 0; push_n < 3.5; push_n += 1) {
     double at[2];
     sonde_vessel_state v;
     press(&b, "healthy", 0, push_n, at);

@@ -220,7 +220,7 @@ double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa
 // Area of the artery relative to its rest area at an effective outside pressure (Pa). @thread any
 double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
 // Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
-// glued to muscle, for a wall of that shear modulus (docs/interior_theory.md). Monotone, @thread any
+// glued to muscle, for a wall of that shear modulus. Monotone. @thread any
 double sonde_vein_tube_pressure(double area_ratio, double wall_shear_pa);
 // Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
 // incompressible half space: lateral x, axial y, normal z (docs/interior_theory.md, superposed

@@ -4,6 +4,7 @@
 #include "interior/interior.h"
 #include "interior/window.h"
 
+static const double engaged_pa = 200;       // from outside: a wall shapes the tissue beside it
 static const double relaxation_s = 0.1;     // emptying of a vein segment (docs/interior_theory.md)
 static const double least_ratio = 1e-12;    // a vein that is pressed flat is still an ellipse
 static const double skin_spread_m = 1.8e-3; // the skin widens the loaded patch by its thickness
@@ -145,7 +146,8 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
     else if (v->outside_pa > 0 || clot)
       goal = sonde_vein_area_in(&held[clot], v->outside_pa, section->in_fat);
     v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
-    v->coupling = section->coupling * clamp(fabs(1 - v->area_ratio) / sonde_engaged_loss, 0, 1);
+    double engaged = fmax(fabs(1 - v->area_ratio) / sonde_engaged_loss, v->outside_pa / engaged_pa);
+    v->coupling = section->coupling * clamp(engaged, 0, 1);
     v->rest_radius_m = section->radius_m * scale[clot][section->in_fat];
     sonde_vessel_shape(in->kind[which], &held[clot], clot, v->area_ratio, &half_short, &half_long);
     v->half_short_m = half_short * v->rest_radius_m;
