@@ -141,6 +141,12 @@ static uint32_t steps_to(const bench *b, double time_s) {
   return (uint32_t)(time_s / b->o->dt_s + 0.5);
 }
 
+// Inner nodes of a volumetric body count, but not those of a condensed one, which only follow.
+static uint32_t moving_nodes(const sonde_model *model) {
+  bool inner = model->bulk && model->kind != SONDE_CONDENSED_SOLID;
+  return inner ? model->bulk->node_count : model->surface.vertex_count;
+}
+
 // Runs the scene from rest, disturbed or not; fills samples when given, and keeps the positions at
 // the time of comparison. kept: [nodes].
 static void run(const bench *b, sonde_state *state, double way_m, sample *samples,
@@ -271,7 +277,7 @@ static void print_json(const bench *b, double error_ratio) {
   double bytes, ratio = floor_ratio(b, &bytes);
   app_json_begin();
   app_json("scene:%s nodes:%u dt_s:%g steps:%u steps_per_s:%g", SCENE_NAMES[b->o->scene],
-           b->model->surface.vertex_count, b->o->dt_s, b->steps, 1 / quantile(b, total, 0.5));
+           moving_nodes(b->model), b->o->dt_s, b->steps, 1 / quantile(b, total, 0.5));
   app_json_object("step_ms");
   app_json("median:%g p99:%g max:%g", quantile(b, total, 0.5) * 1e3, quantile(b, total, 0.99) * 1e3,
            quantile(b, total, 1) * 1e3);
@@ -290,7 +296,7 @@ static void print_table(const bench *b, double error_ratio) {
   size_t total = offsetof(sample, total_s);
   double bytes, ratio = floor_ratio(b, &bytes);
   printf("scene %s: %u nodes, dt %g ms, %u steps, one core\n", SCENE_NAMES[b->o->scene],
-         b->model->surface.vertex_count, b->o->dt_s * 1e3, b->steps);
+         moving_nodes(b->model), b->o->dt_s * 1e3, b->steps);
   printf("  step      median %8.4f ms   p99 %8.4f ms   max %8.4f ms   %8.0f steps/s\n",
          quantile(b, total, 0.5) * 1e3, quantile(b, total, 0.99) * 1e3, quantile(b, total, 1) * 1e3,
          1 / quantile(b, total, 0.5));

@@ -88,6 +88,8 @@ __attribute__((format(printf, 3, 4))) void paper_say(paper_claim *claim, paper_v
 paper_table *paper_table_begin(paper *p, const char *id, const char *title, const char *columns);
 // A row with as many numbers as the table has columns.
 void paper_row(paper_table *table, const char *key, const char *name, const double *cells);
+// MAE over the mean force in per cent, of a probe or (NULL) of all; NaN when a model has no force.
+double paper_percent(const sonde_error_report *report, const char *probe);
 // Cell of a row and a column by their keys; NaN when there is none.
 double paper_cell(const paper_table *table, const char *row, const char *column);
 __attribute__((format(printf, 3, 4))) void paper_caption(char *caption, size_t room,

@@ -63,12 +63,11 @@ typedef struct judged {
 } judged;
 
 static double percent_at(const sonde_measurements *m, const double *model_n, const char *probe) {
-  double off = 0, mean = 0;
-  for (uint32_t i = 0; i < m->count; ++i) {
-    if (!isfinite(model_n[i]) || (probe && strcmp(m->data[i].probe, probe) != 0)) continue;
-    off += fabs(model_n[i] - m->data[i].force_n), mean += m->data[i].force_n;
-  }
-  return mean > 0 ? 100 * off / mean : NAN;
+  sonde_error_report report = {0};
+  sonde_error error = {0};
+  return sonde_error_report_of(m->data, model_n, m->count, &report, &error)
+             ? NAN
+             : paper_percent(&report, probe);
 }
 
 // Processor time of a state's creation and of a step of 1 ms while the flat probe goes in, ms.

@@ -40,22 +40,18 @@ static const char SCENE[] =
     "- {name: ball, shape: {sphere_mm: 20, edge_mm: 5}, density_kg_m3: 1800, material: skin,\n"
     "   position_mm: [105, 0, 150], velocity_m_s: [-1, 0, 0]}\n";
 
-static sonde_status write_scene(const paper *p, double dt_s, char *path, size_t room,
-                                sonde_error *error) {
-  sonde_file *file = NULL;
-  paper_path(p, "drop.yaml", path, room);
-  sonde_status status = sonde_file_create(path, &file, error);
-  if (status) return status;
-  sonde_file_printf(file, SCENE, dt_s);
-  return sonde_file_commit(file, error);
-}
-
 static sonde_status run_drop(const paper *p, double dt_s, double end_s, drop *d,
                              sonde_error *error) {
   char path[1200];
   sonde_scene *scene = NULL;
   sonde_scene_state *state = NULL;
-  sonde_status status = write_scene(p, dt_s, path, sizeof path, error);
+  sonde_file *file = NULL;
+  paper_path(p, "drop.yaml", path, sizeof path);
+  sonde_status status = sonde_file_create(path, &file, error);
+  if (!status) {
+    sonde_file_printf(file, SCENE, dt_s);
+    status = sonde_file_commit(file, error);
+  }
   if (!status) status = sonde_scene_load(path, p->model_path, &scene, error);
   if (!status) status = sonde_scene_state_create(scene, &state, error);
   *d = (drop){.dt_s = dt_s};

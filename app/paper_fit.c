@@ -19,15 +19,6 @@ static int by_value(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-// Errors of a stage, ascending; NaN left out. @return their number
-static uint32_t sorted_errors(const paper *p, const double *model_n, double *errors) {
-  uint32_t count = 0;
-  for (uint32_t i = 0; i < p->measurements.count; ++i)
-    if (isfinite(model_n[i])) errors[count++] = model_n[i] - p->measurements.data[i].force_n;
-  qsort(errors, count, sizeof *errors, by_value);
-  return count;
-}
-
 // A histogram over the middle 99 % with the three densities of greatest likelihood.
 static void draw_histogram(sonde_file *file, double top, const char *title, const double *errors,
                            uint32_t count, const sonde_distribution *fits) {
@@ -100,7 +91,11 @@ static sonde_status judge_distribution(paper *p, sonde_error *error) {
   double ratio = NAN, freedom = NAN, kurtosis = NAN;
   int best = 0;
   for (int k = 0; k < 2 && !status; ++k) {
-    uint32_t count = sorted_errors(p, p->fit.stage_n[k + 1], errors);
+    const double *model_n = p->fit.stage_n[k + 1];
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < p->measurements.count; ++i)
+      if (isfinite(model_n[i])) errors[count++] = model_n[i] - p->measurements.data[i].force_n;
+    qsort(errors, count, sizeof *errors, by_value);
     const sonde_error_statistics *all = k ? &p->fit.stage3.all : &p->fit.stage2.all;
     sonde_distribution fits[SONDE_DISTRIBUTIONS];
     for (int d = 0; d < SONDE_DISTRIBUTIONS && !status; ++d)

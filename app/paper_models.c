@@ -19,13 +19,12 @@ typedef struct outcome {
   sonde_site *sites; // [p->sites.count]
 } outcome;
 
-// A row of the table: springs of some stage of the estimation, or a measurement of its own.
+// A row of the table: springs of some stage of the estimation.
 typedef struct candidate {
   const char *key, *name;
   uint32_t stages; // 0: straight lines; 1, 2: of the paper; 3: with shear, at equilibrium
   double exponent; // of the normal springs of stage 3
-  sonde_status (*measure)(paper *p, outcome *out, sonde_error *error); // NULL: by stages
-  bool is_long;                                                        // left out by --quick
+  bool is_long;    // left out by --quick
 } candidate;
 
 // Some rows of a table; the rows' arrays are borrowed from the caller's copy.
@@ -228,7 +227,7 @@ static sonde_status measure_shear(paper *p, double exponent, outcome *out, sonde
   return status;
 }
 
-// Every model of the table. Finite elements have "elements" in their key.
+// Every model of the table.
 static const candidate CANDIDATES[] = {
     {.key = "linear_springs", .name = "Linear springs F = kx, one per site"},
     {.key = "normal_springs", .name = "Normal springs of eq. (1), no surface", .stages = 1},
@@ -246,8 +245,7 @@ enum { CANDIDATE_COUNT = sizeof CANDIDATES / sizeof *CANDIDATES };
 
 // ---- table and claims
 
-// MAE over the mean force in per cent, per probe or pooled; NaN when a model has no force.
-static double percent_of(const sonde_error_report *r, const char *probe) {
+double paper_percent(const sonde_error_report *r, const char *probe) {
   for (uint32_t k = 0; k < r->probe_count; ++k)
     if (probe && strcmp(r->probe[k], probe) == 0)
       return r->probes[k].count ? r->probes[k].mae_percent : NAN;
@@ -266,9 +264,7 @@ static sonde_status measure_candidate(paper *p, const candidate *m, paper_table 
   sonde_status status = out.seen_n && out.left_out_n && out.third_n && out.sites
                             ? SONDE_OK
                             : (error->status = SONDE_MEMORY);
-  if (!status && m->measure)
-    status = m->measure(p, &out, error);
-  else if (!status && m->stages == 3)
+  if (!status && m->stages == 3)
     status = measure_shear(p, m->exponent, &out, error);
   else if (!status)
     status = measure_simplified(p, m->stages, &out, error);
@@ -285,11 +281,11 @@ static sonde_status measure_candidate(paper *p, const candidate *m, paper_table 
     const double cells[] = {out.parameters,
                             seen.all.mae_n,
                             seen.all.sd_n,
-                            percent_of(&seen, "linear"),
-                            percent_of(&seen, "point"),
-                            percent_of(&seen, NULL),
-                            percent_of(&third, NULL),
-                            percent_of(&left_out, NULL),
+                            paper_percent(&seen, "linear"),
+                            paper_percent(&seen, "point"),
+                            paper_percent(&seen, NULL),
+                            paper_percent(&third, NULL),
+                            paper_percent(&left_out, NULL),
                             setup_ms,
                             step_ms,
                             out.estimate_s,
@@ -350,7 +346,7 @@ static sonde_status judge_one_probe(paper *p, sonde_error *error) {
                                "Two distinct sets of data are taken, with a punctual and with a "
                                "flat contact.",
                                "Stage 3 from the data of one probe alone, predicting the other.");
-  double linear = percent_of(&report, "linear"), point = percent_of(&report, "point");
+  double linear = paper_percent(&report, "linear"), point = paper_percent(&report, "point");
   paper_samples(c, report.all.count, "forces");
   paper_value(c, "linear_from_point_percent", linear);
   paper_value(c, "point_from_linear_percent", point);

@@ -56,7 +56,7 @@ static sonde_status build(const sonde_model_def *given, const sonde_tetrahedra_d
   sonde_status status = sonde_mesh_copy(given->femur, &inner, error);
   if (!status) status = shorten_bone(given->skin, mesh->edge_m, &inner, error);
   if (!status) status = sonde_tetrahedralise(given->skin, &inner, mesh, &solid, error);
-  if (!status) status = sonde_tetrahedra_inspect(&solid, NULL, NULL, &quality, error);
+  if (!status && worst_rad) status = sonde_tetrahedra_inspect(&solid, NULL, NULL, &quality, error);
   if (!status)
     status = sonde_mesh_create(&outer, solid.surface_count, solid.outer_face_count, error);
   if (!status) {
