@@ -274,7 +274,7 @@ static void legs_come_back(void **state) {
 
 static scanner coarse_scanner(void) {
   scanner s = usual();
-  s.step_mm[0] = vec3(4, 0, 0), s.step_mm[1] = vec3(0, 4, 0), s.step_mm[2] = vec3(0, 0, 5);
+  s.step_mm[0] = vec3(5, 0, 0), s.step_mm[1] = vec3(0, 5, 0), s.step_mm[2] = vec3(0, 0, 6);
   return s;
 }
 
@@ -486,12 +486,97 @@ static void skin_alone_is_enough(void **state) {
   unlink(VOLUME);
 }
 
+/* ---- a real leg --------------------------------------------------------------------------- */
+
+static sonde_surface_index *real_surface(const char *name, sonde_mesh *mesh) {
+  char path[512];
+  sonde_surface_index *index = NULL;
+  snprintf(path, sizeof path, "%s/../shared/data/right_leg_surfaces/%s", SONDE_SOURCE_DIR, name);
+  if (sonde_mesh_load(path, 1e-3, mesh, NULL)) {
+    print_message("%s is absent: no real leg to label\n", path);
+    skip();
+  }
+  assert_int_equal(sonde_surface_index_create(mesh, &index, NULL), SONDE_OK);
+  return index;
+}
+
+// The surfaces of a real leg, as a volume of labels and as they are, make the same thigh.
+static void a_real_leg_survives_its_labels(void **state) {
+  (void)state;
+  sonde_mesh mesh[3] = {{0}};
+  static const char *const NAME[] = {"FMA24474.stl", "right_leg_muscle_envelope.stl",
+                                     "right_leg_skin_closed.stl"};
+  static const uint8_t LABEL[] = {BONE, MUSCLE, FAT};
+  sonde_surface_index *index[3];
+  for (int k = 0; k < 3; ++k) index[k] = real_surface(NAME[k], &mesh[k]);
+  const sonde_vec3 low = vec3(-0.22, -0.17, 0.36), step = vec3(0.004, 0.004, 0.005);
+  int64_t dims[8] = {3, 60, 60, 106, 1, 1, 1, 1};
+  nifti_image *image = nifti_make_new_nim(dims, DT_UINT8, 1);
+  assert_non_null(image);
+  for (int64_t at = 0; at < image->nvox; ++at) {
+    sonde_vec3 p = vec3(low.x + step.x * (double)(at % dims[1]),
+                        low.y + step.y * (double)(at / dims[1] % dims[2]),
+                        low.z + step.z * (double)(at / dims[1] / dims[2]));
+    int k = 0;
+    while (k < 3 && !sonde_surface_inside(index[k], p)) ++k;
+    if (k == 3) continue;
+    ((uint8_t *)image->data)[at] = LABEL[k];
+  }
+  // The surfaces run to the left and back.
+  image->sto_xyz = (nifti_dmat44){{{-1e3 * step.x, 0, 0, -1e3 * low.x},
+                                   {0, -1e3 * step.y, 0, -1e3 * low.y},
+                                   {0, 0, 1e3 * step.z, 1e3 * low.z},
+                                   {0, 0, 0, 1}}};
+  image->sform_code = NIFTI_XFORM_SCANNER_ANAT;
+  image->xyz_units = NIFTI_UNITS_MM;
+  assert_int_equal(nifti_set_filenames(image, VOLUME, 0, 1), 0);
+  nifti_image_write(image);
+  nifti_image_free(image);
+
+  sonde_thigh unknown = sonde_thigh_unknown(), got[2];
+  sonde_leg_report report;
+  sonde_leg_labels labels;
+  sonde_error error = {0};
+  if (sonde_leg_labels_load(VOLUME, NULL, &labels, &error)) fail_msg("%s", error.message);
+  const sonde_leg_scan scan[] = {
+      {.skin = &labels.skin,
+       .femur = &labels.femur,
+       .muscle = &labels.muscle,
+       .axes = SONDE_AXES_RAS},
+      {.skin = &mesh[2], .femur = &mesh[0], .muscle = &mesh[1], .axes = SONDE_AXES_LPS}};
+  for (int k = 0; k < 2; ++k) {
+    sonde_thigh_shape *shape = NULL;
+    assert_int_equal(sonde_thigh_draw(&unknown, 1, &got[k], NULL), SONDE_OK);
+    if (sonde_thigh_shape_scan(&scan[k], &got[k], &shape, &report, &error))
+      fail_msg("%s", error.message);
+    sonde_thigh_shape_destroy(shape);
+  }
+  const double voxel = 0.005;
+  assert_near(got[0].girth_m, got[1].girth_m, 0.5 * voxel);
+  // These surfaces end less than two voxels above the first section, so that labels round its edge.
+  assert_near(got[0].girth_proximal_m, got[1].girth_proximal_m, 5 * voxel);
+  assert_near(got[0].girth_distal_m, got[1].girth_distal_m, voxel);
+  assert_near(got[0].length_m, got[1].length_m, voxel);
+  assert_near(got[0].femur_m, got[1].femur_m, 0.15 * voxel);
+  assert_near(got[0].fat_front_m, got[1].fat_front_m, 0.5 * voxel);
+  assert_near(got[0].fat_inner_m, got[1].fat_inner_m, 0.5 * voxel);
+  assert_near(got[0].fat_outer_m, got[1].fat_outer_m, 0.5 * voxel);
+  assert_near(got[0].fat_back_m, got[1].fat_back_m, 0.5 * voxel);
+  print_message("girth %.1f, %.1f mm\n", got[0].girth_m * 1e3, got[1].girth_m * 1e3);
+  for (int k = 0; k < 3; ++k) {
+    sonde_surface_index_destroy(index[k]);
+    sonde_mesh_clear(&mesh[k]);
+  }
+  sonde_leg_labels_clear(&labels);
+  unlink(VOLUME);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(legs_come_back),       cmocka_unit_test(orientation_is_checked),
       cmocka_unit_test(units_are_checked),    cmocka_unit_test(holes_are_filled_or_refused),
       cmocka_unit_test(numbers_have_names),   cmocka_unit_test(other_files_are_refused),
-      cmocka_unit_test(skin_alone_is_enough),
+      cmocka_unit_test(skin_alone_is_enough), cmocka_unit_test(a_real_leg_survives_its_labels),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -134,7 +134,7 @@ rejects 'girth-mm.*muscle' generate --girth-mm 350 --fat-mm 35 -o out.sonde
 rejects 'sex.*female or male' generate --sex other -o out.sonde
 rejects 'axes ras or lps' generate --skin "$in/skin.ply" -o out.sonde
 rejects 'go together' generate --femur "$in/skin.ply" -o out.sonde
-rejects 'skin is 1' generate --skin "$in/skin.ply" --axes ras -o out.sonde
+rejects 'skin shows.*length of' generate --skin "$in/skin.ply" --axes ras -o out.sonde
 rejects 'without --skin' generate --labels leg.nii --axes ras -o out.sonde
 rejects 'needs --labels' generate --label-names names.txt -o out.sonde
 rejects 'nowhere\.nii\.gz' generate --labels nowhere.nii.gz -o out.sonde

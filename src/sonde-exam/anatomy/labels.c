@@ -295,6 +295,9 @@ sonde_status sonde_leg_labels_load(const char *path, const char *names_path, son
     size_t second;
     if (!part[k].wanted || largest_part(&v, part[k].kinds, &second) == 0) continue;
     status = make_surface(&labels, &v, k == 0, part[k].mesh, error);
+    // A vessel that is thinner than the voxels smooth away is not in the scan.
+    if (status == SONDE_MESH && part[k].kinds & (BIT(VEIN) | BIT(ARTERY)) && k > 0)
+      status = SONDE_OK;
   }
   sonde_free(v.kind);
   sonde_free(v.mark);
