@@ -86,9 +86,9 @@ typedef struct app_command {
 #define OPT_TABLE(list) .table = (list), .count = sizeof(list) / sizeof(*(list))
 
 // Every command.
-extern const app_command cmd_run, cmd_fit, cmd_generate, cmd_predict, cmd_measure, cmd_identify,
-    cmd_press, cmd_image, cmd_cut, cmd_simulate, cmd_reconstruct, cmd_slice, cmd_replay, cmd_bench,
-    cmd_exam, cmd_class, cmd_cases, cmd_validate, cmd_paper, cmd_devices;
+extern const app_command cmd_run, cmd_fit, cmd_generate, cmd_limb, cmd_predict, cmd_measure,
+    cmd_identify, cmd_press, cmd_image, cmd_cut, cmd_simulate, cmd_reconstruct, cmd_slice,
+    cmd_replay, cmd_bench, cmd_exam, cmd_class, cmd_cases, cmd_validate, cmd_paper, cmd_devices;
 
 // Reads the words behind the verb. -1: go on; else the exit code, after help or after what is
 // wrong.

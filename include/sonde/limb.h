@@ -175,6 +175,18 @@ SONDE_API sonde_vec3 sonde_limb_point(const sonde_limb *limb, double level, doub
 SONDE_API void sonde_limb_polar(const sonde_limb *limb, sonde_vec3 point, double *level,
                                 double *angle, double *f);
 
+/**
+ * Closed surface of the skin, genus 0.
+ * @param edge_m wanted edge length, 1.5 mm or more
+ * @param[out] mesh released by sonde_mesh_clear()
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_limb_skin(const sonde_limb *limb, double edge_m, sonde_mesh *mesh,
+                                       sonde_error *error);
+/** Closed surface of one bone, genus 0; as sonde_limb_skin(). @thread owner */
+SONDE_API sonde_status sonde_limb_bone_mesh(const sonde_limb *limb, sonde_limb_bone bone,
+                                            double edge_m, sonde_mesh *mesh, sonde_error *error);
+
 /** A muscle of a limb, as measured. */
 typedef struct sonde_limb_muscle {
   const char *name;
@@ -196,6 +208,14 @@ SONDE_API double sonde_limb_muscle_section(const sonde_limb *limb, uint32_t inde
 SONDE_API double sonde_limb_girth(const sonde_limb *limb, double level);
 /** The body of a limb. @thread any */
 SONDE_API const sonde_limb_body *sonde_limb_body_of(const sonde_limb *limb);
+
+/** Draws the labelled section at a level, -0.2 to 2, as SVG, seen from the feet. @thread owner */
+SONDE_API sonde_status sonde_limb_section_svg(const sonde_limb *limb, double level,
+                                              const char *path, sonde_error *error);
+/** Draws the limb from the front and from the medial side: bones, and the skin as a veil.
+ * @thread owner */
+SONDE_API sonde_status sonde_limb_view_svg(const sonde_limb *limb, const char *path,
+                                           sonde_error *error);
 
 #ifdef __cplusplus
 }

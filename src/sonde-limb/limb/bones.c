@@ -117,7 +117,7 @@ static void add_lower(maker *m, const sonde_limb *limb) {
   const double half[][4] = {
       {0.004, 35, 21.5, 0},     {0.02, 38.5, 24.5, 0},   {0.05, 35, 24, 0},
       {0.09, 27, 22, 0.04},     {0.14, 19.5, 19.5, 0.1}, {0.2, 15.5, 17, 0.15},
-      {0.25, 13.8, 15.6, 0.17}, {0.5, 11.2, 12.9, 0.17}, {0.75, 11.6, 11.6, 0.12},
+      {0.25, 13.8, 15.6, 0.11}, {0.5, 11.2, 12.9, 0.11}, {0.75, 11.6, 11.6, 0.09},
       {0.88, 15, 13.6, 0.05},   {0.95, 20, 17, 0.02},    {1, 23, 18.5, 0}};
   limb_sweep *s = &bones->sweep[1];
   s->high = -lt - 0.004 * lc, s->low = -lt - lc, s->turn = -0.09;
@@ -159,16 +159,19 @@ static void add_lower(maker *m, const sonde_limb *limb) {
 // the ischium, in one piece.
 static void add_pelvis(maker *m, const sonde_limb *limb) {
   double k = limb->scale * MM, head = limb->body.head_m / 2;
-  add_ellipsoid(m, LIMB_ELLIPSOID, vec3(9 * k, 3 * k, 9 * k), vec3(28 * k, 30 * k, 29 * k));
+  double cup = head / 0.024, far = 0.3;
+  add_ellipsoid(m, LIMB_ELLIPSOID, vec3(8 * MM * cup, 1 * MM * cup, 8 * MM * cup),
+                vec3(30 * MM * cup, 31 * MM * cup, 31 * MM * cup));
+  // The socket's rim: a plane, as a ball of 300 mm, cuts the cup on the lateral side and below.
+  sonde_vec3 rim = v_scale(v_unit(vec3(-0.75, 0.2, -0.62), vec3(0, 0, 0)), far + 0.003);
+  add_ellipsoid(m, LIMB_HOLLOW, rim, vec3(far, far, far));
   add_cone(m, vec3(22 * k, 20 * k, 16 * k), 10 * k, vec3(44 * k, 34 * k, 4 * k), 7.5 * k);
   add_cone(m, vec3(44 * k, 34 * k, 4 * k), 7.5 * k, vec3(57 * k, 37 * k, -6 * k), 7.5 * k);
   add_cone(m, vec3(4 * k, -4 * k, 30 * k), 19 * k, vec3(-12 * k, -4 * k, 86 * k), 15 * k);
-  add_cone(m, vec3(-8 * k, 22 * k, 32 * k), 9 * k, vec3(-24 * k, 36 * k, 60 * k), 8 * k);
+  add_cone(m, vec3(0, 8 * k, 36 * k), 13 * k, vec3(-24 * k, 36 * k, 60 * k), 8 * k);
   add_cone(m, vec3(12 * k, -22 * k, -4 * k), 15 * k, vec3(18 * k, -46 * k, -40 * k), 13 * k);
-  // The socket, open to the lateral side, the front and below.
   double socket = head + 2.2 * MM;
   add_ellipsoid(m, LIMB_HOLLOW, vec3(0, 0, 0), vec3(socket, socket, socket));
-  add_ellipsoid(m, LIMB_HOLLOW, vec3(-34 * k, 4 * k, -27 * k), vec3(36 * k, 30 * k, 32 * k));
 }
 
 static double ellipsoid_distance(const limb_solid *s, sonde_vec3 p) {
@@ -223,10 +226,11 @@ double limb_one_bone(const struct limb_bones *bones, uint32_t bone, sonde_vec3 p
     else
       d = s->kind == LIMB_CONE ? cone_distance(s, p) : ellipsoid_distance(s, p);
     if (s->kind == LIMB_HOLLOW) {
-      distance = fmax(distance, -d);
+      double h = fmax(blend - fabs(distance + d), 0) / blend;
+      distance = fmax(distance, -d) + 0.25 * h * h * blend;
       continue;
     }
-    // Smooth union: a fillet of `blend` where two parts meet.
+    // Smooth union: a fillet of `blend` where two parts meet; edges of hollows are rounded alike.
     double h = fmax(blend - fabs(distance - d), 0) / blend;
     distance = fmin(distance, d) - 0.25 * h * h * blend;
   }

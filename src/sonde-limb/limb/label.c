@@ -145,13 +145,20 @@ sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 poin
   const double xyz[3] = {p.x, p.y, p.z}, top = limb_z(limb, LIMB_TOP), foot = limb_z(limb, 2);
   double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2);
   sonde_vec3 c = limb_centre(limb, level);
-  double x = p.x - c.x, y = p.y - c.y, r = sqrt(x * x + y * y), a = atan2(x, y), h = 0.01;
-  // The distance along the ray over the slope of the surface, so that it is the one along the
-  // normal.
+  double x = p.x - c.x, y = p.y - c.y, r = sqrt(x * x + y * y), a = atan2(x, y);
+  // The distance along the ray over the slope of the surface around and along the limb is the one
+  // along the normal.
+  const double turn = 0.02, rise = 0.006;
   double fascia = limb_fascia_radius(limb, level, a), skin = limb_skin_radius(limb, level, a);
   double around =
-      (limb_skin_radius(limb, level, a + h) - limb_skin_radius(limb, level, a - h)) / 2 / h;
-  double slope = sqrt(1 + around * around / (skin * skin)), beyond = fmax(p.z - top, foot - p.z);
+      (limb_skin_radius(limb, level, a + turn) - limb_skin_radius(limb, level, a - turn)) /
+      (2 * turn * skin);
+  sonde_vec3 up = limb_centre(limb, level - rise), down = limb_centre(limb, level + rise);
+  double along =
+      (limb_skin_radius(limb, level - rise, a) - limb_skin_radius(limb, level + rise, a) +
+       (up.x - down.x) * sin(a) + (up.y - down.y) * cos(a)) /
+      (up.z - down.z);
+  double slope = sqrt(1 + around * around + along * along), beyond = fmax(p.z - top, foot - p.z);
   return (sonde_limb_distances){
       fmax((r - skin) / slope, beyond), fmax((r - fascia) / slope, beyond),
       limb_bone_distance(limb, xyz, NULL),

@@ -417,7 +417,7 @@ const limb_muscle limb_muscle_table[SONDE_LIMB_MUSCLES] = {
      LIMB_LEG_DEEP,
      45,
      1,
-     {K(1.22, {75, 0.5}), K(1.5, {72, 0.5}), K(1.75, {90, 0.7}), K(1.95, {105, 0.7})},
+     {K(1.22, {66, 0.46}), K(1.5, {72, 0.5}), K(1.75, {90, 0.7}), K(1.95, {105, 0.7})},
      {{0}}},
     {"flexor hallucis longus",
      80,
@@ -444,7 +444,7 @@ const limb_muscle limb_muscle_table[SONDE_LIMB_MUSCLES] = {
      40,
      2,
      {K(0.98, {250, 0.5}, {235, 0.45}), K(1.1, {180, 0.3}, {140, 0.3}),
-      K(1.25, {75, 0.4}, {60, 0.42})},
+      K(1.25, {35, 0.3}, {52, 0.32})},
      {{0}}},
     {"plantaris",
      7,
@@ -566,12 +566,12 @@ int limb_tendon_at(const sonde_limb *limb, double level, double x, double y) {
     double r = (a[2] + u * (b[2] - a[2])) * limb_fascia_radius(limb, level, angle);
     double wide = (a[3] + u * (b[3] - a[3])) * size * 1e-3;
     double thick = (a[4] + u * (b[4] - a[4])) * size * 1e-3;
-    // Across and along the fascia, whose direction the ellipse takes.
-    double dx = x - r * sin(angle), dy = y - r * cos(angle);
-    double outward = dx * sin(angle) + dy * cos(angle);
-    double along = dx * cos(angle) - dy * sin(angle);
-    double bend = r > 0 ? 0.5 * along * along / r : 0; // the strip follows the fascia's curve
-    double p = along / wide, q = (outward + bend) / thick;
+    // Along the fascia and outward from the strip's middle, which follows the fascia's curve.
+    double here = atan2(x, y), from = hypot(x, y);
+    double outward =
+        from - r / limb_fascia_radius(limb, level, angle) * limb_fascia_radius(limb, level, here);
+    double along = from * remainder(here - angle, 2 * SONDE_PI);
+    double p = along / wide, q = outward / thick;
     if (p * p + q * q < 1) return (int)k;
   }
   return -1;

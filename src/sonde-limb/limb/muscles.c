@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const double LEAST_AREA = 14e-6; // a belly of less is a tendon
-static const double MOST_SCALE = 1.5;   // muscle against its rule; fat takes what is left
+static const double MOST_SCALE = 1.4;   // muscle against its rule; fat takes what is left
 
 // Fat between the muscles: which share of the section it takes at levels, and where.
 typedef struct filler {
@@ -94,8 +94,12 @@ double limb_muscle_area(const sonde_limb_body *b, uint32_t muscle, double level)
   SONDE_ASSERT(muscle < SONDE_LIMB_MUSCLES);
   const limb_muscle *m = &limb_muscle_table[muscle];
   double factor = limb_muscle_rule(b) * b->share[muscle];
-  if (m->volume_cm3 <= 0) // areas of a leg of 430 mm of thigh
-    return factor * KNOTS(m->area, 1, level) * 1e-6 * 0.430 / b->thigh_length_m;
+  if (m->volume_cm3 <= 0) { // areas of a leg of 430 mm of thigh
+    uint32_t rows = 1;
+    while (rows < SONDE_COUNT_OF(m->area) && m->area[rows][0] > m->area[rows - 1][0]) ++rows;
+    return factor * limb_through(&m->area[0][0], rows, 2, 1, level) * 1e-6 * 0.430 /
+           b->thigh_length_m;
+  }
   double u = (level - m->from) / (m->to - m->from);
   if (u <= 0 || u >= 1) return 0;
   double a = m->spread * (m->peak - m->from) / (m->to - m->from), c = m->spread - a;
@@ -151,35 +155,39 @@ static void sample_section(const sonde_limb *limb, double level, double radius, 
 // distance to it. `least` gets how much nearer a cell would have to be to own any sample.
 static void measure_cells(const struct limb_muscles *m, uint32_t row, const section *s,
                           double *area, double *least) {
-  memset(area, 0, LIMB_CELLS * sizeof *area);
-  for (uint32_t k = 0; k < LIMB_CELLS; ++k) least[k] = INFINITY;
-  const limb_seed *seed = m->seed[row];
-  for (uint32_t i = 0; i < s->count; ++i) {
-    float best[LIMB_CELLS];
-    uint32_t at[LIMB_CELLS], first = 0, second = 0;
-    for (uint32_t k = 0; k < LIMB_CELLS; ++k) best[k] = 1e30F, at[k] = 0;
-    for (uint32_t k = 0; k < m->seed_count; ++k) {
-      float dx = s->x[i] - seed[k].x, dy = s->y[i] - seed[k].y;
-      float d = dx * dx + dy * dy - seed[k].weight;
-      uint32_t cell = m->cell_of[k];
-      if (d < best[cell]) best[cell] = d, at[cell] = k;
-    }
-    float d1 = 1e30F, d2 = 1e30F;
-    for (uint32_t k = 0; k < LIMB_CELLS; ++k) {
-      if (best[k] < d1)
-        d2 = d1, second = first, d1 = best[k], first = k;
-      else if (best[k] < d2)
-        d2 = best[k], second = k;
-    }
-    for (uint32_t k = 0; k < LIMB_CELLS; ++k) {
-      double nearer = k == first ? 0 : best[k] - d1;
-      if (nearer < least[k]) least[k] = nearer;
-    }
-    const limb_seed *a = &seed[at[first]], *b = &seed[at[second]];
-    double apart = hypot(a->x - b->x, a->y - b->y) + 1e-6;
-    double part = fmin(1, 0.5 + 0.5 * (d2 - d1) / apart / s->spacing);
-    area[first] += part * s->cell_area, area[second] += (1 - part) * s->cell_area;
+  float x[LIMB_SEEDS], y[LIMB_SEEDS], weight[LIMB_SEEDS], d[LIMB_SEEDS], nearer[LIMB_SEEDS];
+  for (uint32_t k = 0; k < LIMB_SEEDS; ++k) {
+    bool used = k < m->seed_count;
+    x[k] = used ? m->seed[row][k].x : 0, y[k] = used ? m->seed[row][k].y : 0;
+    weight[k] = used ? m->seed[row][k].weight : -1e6F, nearer[k] = 1e30F;
   }
+  memset(area, 0, LIMB_CELLS * sizeof *area);
+  for (uint32_t i = 0; i < s->count; ++i) {
+    float px = s->x[i], py = s->y[i], d1 = 1e30F, d2 = 1e30F;
+    for (uint32_t k = 0; k < LIMB_SEEDS; ++k) {
+      float dx = px - x[k], dy = py - y[k];
+      d[k] = dx * dx + dy * dy - weight[k];
+    }
+    uint32_t first = 0, second = 0;
+    for (uint32_t k = 0; k < m->seed_count; ++k) {
+      if (d[k] >= d2) continue;
+      if (d[k] < d1) {
+        if (m->cell_of[k] != m->cell_of[first]) d2 = d1, second = first;
+        d1 = d[k], first = k;
+      } else if (m->cell_of[k] != m->cell_of[first]) {
+        d2 = d[k], second = k;
+      }
+    }
+    for (uint32_t k = 0; k < LIMB_SEEDS; ++k)
+      nearer[k] = d[k] - d1 < nearer[k] ? d[k] - d1 : nearer[k];
+    double apart = hypot(x[first] - x[second], y[first] - y[second]) + 1e-6;
+    double part = fmin(1, 0.5 + 0.5 * (d2 - d1) / apart / s->spacing);
+    area[m->cell_of[first]] += part * s->cell_area;
+    area[m->cell_of[second]] += (1 - part) * s->cell_area;
+  }
+  for (uint32_t k = 0; k < LIMB_CELLS; ++k) least[k] = INFINITY;
+  for (uint32_t k = 0; k < m->seed_count; ++k)
+    least[m->cell_of[k]] = fmin(least[m->cell_of[k]], nearer[k]);
 }
 
 static void set_weight(struct limb_muscles *m, uint32_t row, uint32_t cell, double by) {
@@ -200,7 +208,7 @@ static void solve_row(struct limb_muscles *m, uint32_t row, const section *s) {
       double wanted = m->target[row][k] / unit, error = wanted - area[k];
       if (wanted <= 0) {
         // Absent: just out of every sample's reach.
-        set_weight(m, row, k, area[k] > 0 ? -0.03 - 0.5 * area[k] : fmin(least[k] - 0.02, 0.1));
+        set_weight(m, row, k, area[k] > 0 ? -0.03 - 0.5 * area[k] : fmin(least[k] - 0.04, 0.1));
         worst = fmax(worst, area[k] > 0 ? area[k] / 0.004 * 0.02 : 0);
         continue;
       }
@@ -217,7 +225,14 @@ static void solve_row(struct limb_muscles *m, uint32_t row, const section *s) {
     }
     if (worst < 0.008) break;
   }
-  measure_cells(m, row, s, area, least);
+  // What is absent goes entirely; its neighbours gain less than a sample.
+  for (uint32_t pass = 0, owned = 1; pass < 40 && owned; ++pass) {
+    measure_cells(m, row, s, area, least);
+    owned = 0;
+    for (uint32_t k = 0; k < LIMB_CELLS; ++k)
+      if (m->target[row][k] <= 0 && (area[k] > 0 || least[k] < 0.03))
+        set_weight(m, row, k, -0.02 - area[k]), owned = 1;
+  }
   for (uint32_t k = 0; k < LIMB_CELLS; ++k) m->area[row][k] = area[k] * unit;
 }
 

@@ -3,6 +3,8 @@
 #include "limb/bones.h"
 #include "limb/knots.h"
 
+#include <string.h>
+
 // Catmull-Rom weights at a fraction between the second and the third of four values.
 static inline void catmull_rom(double u, double w[4]) {
   w[0] = 0.5 * u * (-1 + u * (2 - u));
@@ -120,7 +122,7 @@ static const double HARMONICS[][5] = {
 static const double CENTRES[][3] = {
     {-0.2, 15, 0.26},  {0, 18, 0.24},    {0.15, 272, 0.46}, {0.25, 274, 0.4}, {0.5, 299, 0.2},
     {0.75, 317, 0.21}, {0.9, 345, 0.12}, {0.99, 5, 0.02},   {1.01, 15, 0.05}, {1.12, 22, 0.46},
-    {1.25, 24, 0.66},  {1.5, 28, 0.66},  {1.75, 25, 0.52},  {1.9, 30, 0.34},  {2, 22, 0.25}};
+    {1.25, 24, 0.73},  {1.5, 28, 0.75},  {1.75, 25, 0.52},  {1.9, 30, 0.34},  {2, 22, 0.25}};
 
 // Skin girth at a level: the measured profile, scaled to the body's four girths.
 static double girth_at(const sonde_limb_body *b, double level) {
@@ -136,7 +138,8 @@ static double fat_at(const sonde_limb_body *b, double level, double angle) {
   double hip = b->sex == SONDE_SEX_FEMALE ? 1.6 : 1.15; // lateral, proximal
   double front = b->fat_front_m, medial = b->fat_medial_m, lateral = b->fat_lateral_m,
          back = b->fat_back_m, fold = sqrt(b->fat_popliteal_m * back), shin = b->fat_shin_m,
-         calf = b->fat_calf_m, inner = b->fat_calf_medial_m, groin = b->fat_groin_m;
+         calf = b->fat_calf_m, inner = b->fat_calf_medial_m, groin = b->fat_groin_m,
+         outer = 1.05 * sqrt(calf * inner);
   const double sides[][5] = {
       {-0.2, log(1.2 * groin), log(1.1 * medial), log(1.3 * hip * lateral), log(2.4 * back)},
       {0, log(groin), log(1.2 * medial), log(1.25 * hip * lateral), log(2.6 * back)},
@@ -147,10 +150,10 @@ static double fat_at(const sonde_limb_body *b, double level, double angle) {
       {0.75, log(0.9 * front), log(0.95 * medial), log(0.9 * lateral), log(0.9 * back)},
       {0.93, log(0.5 * front), log(0.75 * medial), log(0.7 * lateral), log(fold)},
       {1, log(0.0035), log(0.65 * medial), log(0.6 * lateral), log(b->fat_popliteal_m)},
-      {1.1, log(1.2 * shin), log(0.9 * inner), log(0.9 * inner), log(b->fat_popliteal_m)},
-      {1.25, log(shin), log(inner), log(0.9 * inner), log(calf)},
-      {1.5, log(0.95 * shin), log(0.8 * inner), log(0.75 * inner), log(0.8 * calf)},
-      {1.75, log(0.9 * shin), log(0.55 * inner), log(0.5 * inner), log(0.55 * calf)},
+      {1.1, log(1.2 * shin), log(0.9 * inner), log(outer), log(b->fat_popliteal_m)},
+      {1.25, log(shin), log(inner), log(outer), log(calf)},
+      {1.5, log(0.95 * shin), log(0.8 * inner), log(0.85 * outer), log(0.8 * calf)},
+      {1.75, log(0.9 * shin), log(0.55 * inner), log(0.5 * outer), log(0.55 * calf)},
       {2, log(0.9 * shin), log(0.3 * inner), log(0.3 * inner), log(0.5 * calf)}};
   double f = KNOTS(sides, 1, level), m = KNOTS(sides, 2, level), l = KNOTS(sides, 3, level),
          p = KNOTS(sides, 4, level);
@@ -257,7 +260,7 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
   SONDE_ASSERT(limb->bones);
   const sonde_limb_body *b = &limb->body;
   limb_surface *s = &limb->surface;
-  double(*around)[LIMB_ANGLES] = sonde_calloc(LIMB_ROWS, sizeof *around);
+  double(*around)[LIMB_ANGLES] = sonde_calloc((size_t)3 * LIMB_ROWS, sizeof *around);
   if (!around) return sonde_fail_memory(error);
   double outside[LIMB_ANGLES], none[LIMB_ANGLES] = {0};
   // Sections as if there were no bones.
@@ -290,19 +293,35 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
     knots[k][0] = at, knots[k][1] = bone.x - f * sin(a), knots[k][2] = bone.y - f * cos(a);
     if (at <= 0) knots[k][2] = 0.062 * limb->scale - limb_fascia_radius(limb, at, 0.25);
   }
-  // The fascia passes outside the bones; the girth stays.
+  // The fascia passes outside the bones; the girth stays. What the bones add and what the size
+  // loses by them are spread over neighbouring rows, so that the skin has no edge there.
+  double(*bone)[LIMB_ANGLES] = &around[LIMB_ROWS], (*pushed)[LIMB_ANGLES] = &around[2 * LIMB_ROWS];
   for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
-    double level = LIMB_TOP + r * LIMB_STEP, bone[LIMB_ANGLES];
+    double level = LIMB_TOP + r * LIMB_STEP;
     s->x[r] = KNOTS(knots, 1, level), s->y[r] = KNOTS(knots, 2, level);
     sonde_vec3 centre = vec3(s->x[r], s->y[r], limb_z(limb, level));
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
       double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
-      bone[c] = bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], 0.0012);
+      bone[r][c] = bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], 0.0012);
       outside[c] = s->fat[r][c] + b->skin_m;
     }
-    fit_section(around[r], bone, outside, girth_at(b, level), s->fascia[r]);
-    recentre(&s->x[r], &s->y[r], s->fascia[r]);
+    fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
   }
+  for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
+    enum { SPREAD = 6 };
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+      double sum = 0, weights = 0;
+      for (int k = -SPREAD; k <= SPREAD; ++k) {
+        int row = (int)r + k;
+        if (row < 0 || row >= LIMB_ROWS) continue;
+        double w = SPREAD + 1 - abs(k);
+        sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
+      }
+      around[r][c] = fmax(s->fascia[r][c] + sum / weights, bone[r][c]);
+    }
+  }
+  memcpy(s->fascia, around, sizeof s->fascia);
+  for (uint32_t r = 0; r < LIMB_ROWS; ++r) recentre(&s->x[r], &s->y[r], s->fascia[r]);
   sonde_free(around);
   return SONDE_OK;
 }

@@ -1,0 +1,200 @@
+// sonde limb: a lower limb from a body and a seed: its table, labelled sections, a view.
+#include "options.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char VERB[] = "limb";
+
+typedef struct options {
+  const char *atlas, *skin, *levels;
+  bool json;
+  long seed;
+  int sex, side; // -1: drawn, right
+  sonde_limb_body known;
+} options;
+
+static void prepare(void *to) {
+  *(options *)to = (options){.seed = 1, .sex = -1, .side = -1, .known = sonde_limb_unknown()};
+}
+
+static const char *const SEXES[] = {"female", "male", NULL};
+static const char *const SIDES[] = {"right", "left", NULL};
+
+static const app_option TABLE[] = {
+    OPT_INTEGER(seed, "seed", "N", 0, 4294967295, "of what is drawn"),
+    OPT_WORD(sex, "sex", "SEX", SEXES, "sex; default drawn"),
+    OPT_WORD(side, "side", "SIDE", SIDES, "side; a left limb is the mirror of a right one"),
+    OPT_TEXT(atlas, "atlas", "DIR", "write labelled sections and a view as SVG into a directory"),
+    OPT_TEXT(levels, "levels", "L,L...",
+             "levels of the sections: 0 hip, 1 knee joint line, 2 ankle; default -0.05 to 1.9"),
+    OPT_OUTPUT(skin, "skin", "FILE", "write the skin as .ply, .obj or .stl, mm"),
+    OPT_JSON(json),
+    OPT_GROUP("Parameters of the body; what is not given is drawn")};
+
+// The parameters of a body, as the library lists them.
+static uint32_t list_parameters(app_option *list, uint32_t room) {
+  uint32_t count;
+  const sonde_limb_parameter *p = sonde_limb_parameters(&count);
+  if (count > room) count = room;
+  for (uint32_t k = 0; k < count; ++k)
+    list[k] = (app_option){.name = p[k].name,
+                           .value = "X",
+                           .kind = OPTION_REAL,
+                           .at = offsetof(options, known) + p[k].offset,
+                           .bytes = sizeof(double),
+                           .low = p[k].low / p[k].unit,
+                           .high = p[k].high / p[k].unit,
+                           .scale = p[k].unit,
+                           .help = p[k].text};
+  return count;
+}
+
+enum { MOST_LEVELS = 40 };
+
+// Levels of --levels; 0 after saying what is wrong.
+static uint32_t read_levels(const char *text, double *level) {
+  static const double USUAL[] = {-0.05, 0.05, 0.15, 0.25, 0.5,  0.62, 0.75,
+                                 0.9,   1.06, 1.25, 1.5,  1.75, 1.9};
+  if (!text) {
+    memcpy(level, USUAL, sizeof USUAL);
+    return sizeof USUAL / sizeof *USUAL;
+  }
+  uint32_t count = 0;
+  while (*text && count < MOST_LEVELS) {
+    const char *end;
+    level[count] = sonde_parse_real(text, &end);
+    if (end == text || (*end && *end != ',') || !(level[count] >= -0.2 && level[count] <= 2)) break;
+    ++count;
+    if (!*end) return count;
+    text = end + 1;
+  }
+  app_usage_error(VERB,
+                  "--levels: expected up to %d numbers from -0.2 to 2 with commas between "
+                  "them, but got '%s'",
+                  MOST_LEVELS, text);
+  return 0;
+}
+
+static int check(void *from) {
+  options *a = from;
+  double level[MOST_LEVELS];
+  if (a->levels && !a->atlas) return app_usage_error(VERB, "--levels needs --atlas");
+  if (!read_levels(a->levels, level)) return APP_BAD_INPUT;
+  if (a->sex >= 0) a->known.sex = a->sex ? SONDE_SEX_MALE : SONDE_SEX_FEMALE;
+  a->known.side = a->side == 1 ? SONDE_LIMB_LEFT : SONDE_LIMB_RIGHT;
+  return APP_OK;
+}
+
+static sonde_status write_atlas(const options *a, const sonde_limb *limb, sonde_error *error) {
+  double level[MOST_LEVELS];
+  uint32_t count = read_levels(a->levels, level);
+  sonde_status status = sonde_directory_make(a->atlas, 0777, true, error);
+  char path[1024];
+  for (uint32_t k = 0; k < count && !status; ++k) {
+    snprintf(path, sizeof path, "%s/section_%+.2f.svg", a->atlas, level[k]);
+    status = sonde_limb_section_svg(limb, level[k], path, error);
+  }
+  snprintf(path, sizeof path, "%s/view.svg", a->atlas);
+  return status ? status : sonde_limb_view_svg(limb, path, error);
+}
+
+static const double GIRTHS[] = {0.12, 0.25, 0.5, 0.75, 0.88, 1, 1.15, 1.28, 1.5, 1.75, 1.86};
+
+static void print_json(const options *a, const sonde_limb *limb) {
+  const sonde_limb_body *body = sonde_limb_body_of(limb);
+  uint32_t count;
+  const sonde_limb_parameter *p = sonde_limb_parameters(&count);
+  app_json_begin();
+  app_json("seed:%ld sex:%s side:%s", a->seed, body->sex == SONDE_SEX_FEMALE ? "female" : "male",
+           body->side == SONDE_LIMB_LEFT ? "left" : "right");
+  app_json_object("parameters");
+  for (uint32_t k = 0; k < count; ++k) {
+    const double *value = (const double *)(const void *)((const char *)body + p[k].offset);
+    app_json_real(p[k].name, *value / p[k].unit);
+  }
+  app_json_close();
+  app_json_array("girths");
+  for (size_t k = 0; k < sizeof GIRTHS / sizeof *GIRTHS; ++k) {
+    app_json_object(NULL);
+    app_json("level:%g girth_mm:%g", GIRTHS[k], 1e3 * sonde_limb_girth(limb, GIRTHS[k]));
+    app_json_close();
+  }
+  app_json_close();
+  app_json_array("muscles");
+  for (uint32_t k = 0; k < sonde_limb_muscle_count(); ++k) {
+    sonde_limb_muscle m = sonde_limb_muscle_at(limb, k);
+    app_json_object(NULL);
+    app_json_text("name", m.name);
+    app_json("volume_cm3:%g rule_cm3:%g largest_cm2:%g largest_level:%g pennation_deg:%g "
+             "fibre_mm:%g",
+             m.volume_m3 * 1e6, m.rule_m3 * 1e6, m.largest_m2 * 1e4, m.largest_level,
+             m.pennation_rad * 57.29577951308232, m.fibre_m * 1e3);
+    app_json_close();
+  }
+  app_json_close();
+  if (a->atlas) app_json_text("atlas", a->atlas);
+  if (a->skin) app_json_text("skin", a->skin);
+  app_json_end();
+}
+
+static void print_text(const options *a, const sonde_limb *limb) {
+  const sonde_limb_body *body = sonde_limb_body_of(limb);
+  uint32_t count;
+  const sonde_limb_parameter *p = sonde_limb_parameters(&count);
+  printf("seed %ld, %s, %s\n", a->seed, body->sex == SONDE_SEX_FEMALE ? "female" : "male",
+         body->side == SONDE_LIMB_LEFT ? "left" : "right");
+  for (uint32_t k = 0; k < count; ++k) {
+    const double *value = (const double *)(const void *)((const char *)body + p[k].offset);
+    printf("%-20s %8.2f  %s\n", p[k].name, *value / p[k].unit, p[k].text);
+  }
+  printf("\nlevel   girth mm\n");
+  for (size_t k = 0; k < sizeof GIRTHS / sizeof *GIRTHS; ++k)
+    printf("%5.2f   %8.0f\n", GIRTHS[k], 1e3 * sonde_limb_girth(limb, GIRTHS[k]));
+  printf("\n%-30s %10s %9s %12s %6s\n", "muscle", "volume cm3", "rule cm3", "largest cm2", "level");
+  double volume = 0, rule = 0;
+  for (uint32_t k = 0; k < sonde_limb_muscle_count(); ++k) {
+    sonde_limb_muscle m = sonde_limb_muscle_at(limb, k);
+    printf("%-30s %10.0f %9.0f %12.1f %6.2f\n", m.name, m.volume_m3 * 1e6, m.rule_m3 * 1e6,
+           m.largest_m2 * 1e4, m.largest_level);
+    volume += m.volume_m3, rule += m.rule_m3;
+  }
+  printf("%-30s %10.0f %9.0f\n", "all", volume * 1e6, rule * 1e6);
+}
+
+static int run(void *from) {
+  const options *a = from;
+  assert(a->seed >= 0);
+  sonde_limb_body body;
+  sonde_limb *limb = NULL;
+  sonde_mesh skin = {0};
+  sonde_error error = {0};
+  app_progress_begin("making the limb");
+  sonde_status status = sonde_limb_draw(&a->known, (uint64_t)a->seed, &body, &error);
+  if (!status) status = sonde_limb_create(&body, &limb, &error);
+  if (!status && a->atlas) status = write_atlas(a, limb, &error);
+  if (!status && a->skin) status = sonde_limb_skin(limb, 0.004, &skin, &error);
+  if (!status && a->skin) status = sonde_mesh_save(a->skin, 1e-3, &skin, &error);
+  app_progress_end();
+  if (!status) (a->json ? print_json : print_text)(a, limb);
+  sonde_mesh_clear(&skin);
+  sonde_limb_destroy(limb);
+  return status ? app_fail(VERB, &error) : APP_OK;
+}
+
+const app_command cmd_limb = {
+    .verb = "limb",
+    .summary = "make a lower limb from a body and a seed, and draw it",
+    .usage = "[--seed N] [PARAMETERS] [--atlas DIR] [options]",
+    .text =
+        "Makes a lower limb from the groin to the ankle: bones, muscles, fasciae, fat, skin and "
+        "vessels, and prints its table. What is not given is drawn by the population's rules; "
+        "equal seeds and parameters give equal limbs. Synthetic, not a person.",
+    OPT_TABLE(TABLE),
+    .extend = list_parameters,
+    .size = sizeof(options),
+    .prepare = prepare,
+    .check = check,
+    .run = run};
