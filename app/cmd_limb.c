@@ -88,19 +88,6 @@ static int check(void *from) {
   return APP_OK;
 }
 
-static sonde_status write_atlas(const options *a, const sonde_limb *limb, sonde_error *error) {
-  double level[MOST_LEVELS];
-  uint32_t count = read_levels(a->levels, level);
-  sonde_status status = sonde_directory_make(a->atlas, 0777, true, error);
-  char path[1024];
-  for (uint32_t k = 0; k < count && !status; ++k) {
-    snprintf(path, sizeof path, "%s/section_%+.2f.svg", a->atlas, level[k]);
-    status = sonde_limb_section_svg(limb, level[k], path, error);
-  }
-  snprintf(path, sizeof path, "%s/view.svg", a->atlas);
-  return status ? status : sonde_limb_view_svg(limb, path, error);
-}
-
 static const double GIRTHS[] = {0.12, 0.25, 0.5, 0.75, 0.88, 1, 1.15, 1.28, 1.5, 1.75, 1.86};
 
 static void print_json(const options *a, const sonde_limb *limb) {
@@ -174,7 +161,19 @@ static int run(void *from) {
   app_progress_begin("making the limb");
   sonde_status status = sonde_limb_draw(&a->known, (uint64_t)a->seed, &body, &error);
   if (!status) status = sonde_limb_create(&body, &limb, &error);
-  if (!status && a->atlas) status = write_atlas(a, limb, &error);
+  // The atlas: sections at the levels, then the view.
+  double level[MOST_LEVELS];
+  uint32_t count = read_levels(a->levels, level);
+  char path[1024];
+  if (!status && a->atlas) status = sonde_directory_make(a->atlas, 0777, true, &error);
+  for (uint32_t k = 0; a->atlas && k < count && !status; ++k) {
+    snprintf(path, sizeof path, "%s/section_%+.2f.svg", a->atlas, level[k]);
+    status = sonde_limb_section_svg(limb, level[k], path, &error);
+  }
+  if (!status && a->atlas) {
+    snprintf(path, sizeof path, "%s/view.svg", a->atlas);
+    status = sonde_limb_view_svg(limb, path, &error);
+  }
   if (!status && a->skin) status = sonde_limb_skin(limb, 0.004, &skin, &error);
   if (!status && a->skin) status = sonde_mesh_save(a->skin, 1e-3, &skin, &error);
   app_progress_end();

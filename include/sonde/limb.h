@@ -170,8 +170,9 @@ SONDE_API sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde
 /** Unit direction of the muscle fibres at a point, downwards; false outside muscles. @thread any */
 SONDE_API bool sonde_limb_fibre(const sonde_limb *limb, sonde_vec3 point, sonde_vec3 *direction);
 
-/** A point by level, angle (rad) and fraction of the fascia's radius, and back. @thread any */
+/** A point by level, angle (rad) and fraction of the fascia's radius. @thread any */
 SONDE_API sonde_vec3 sonde_limb_point(const sonde_limb *limb, double level, double angle, double f);
+/** @thread any */
 SONDE_API void sonde_limb_polar(const sonde_limb *limb, sonde_vec3 point, double *level,
                                 double *angle, double *f);
 

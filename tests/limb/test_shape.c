@@ -162,7 +162,8 @@ static void distances_and_places_agree(void **state) {
   assert_int_equal(sonde_limb_skin(limb, 0.003, &skin, NULL), SONDE_OK);
   assert_int_equal(sonde_surface_index_create(&skin, &index, NULL), SONDE_OK);
   for (int i = 0; i < 2000; ++i) {
-    double level = -0.1 + 2 * next_uniform(&random), angle = 2 * SONDE_PI * next_uniform(&random);
+    double level = 0.15 + 1.75 * next_uniform(&random),
+           angle = 2 * SONDE_PI * next_uniform(&random);
     double at_skin = limb_skin_radius(limb, level, angle) / limb_fascia_radius(limb, level, angle);
     sonde_vec3 p =
         sonde_limb_point(limb, level, angle, at_skin * (0.97 + 0.06 * next_uniform(&random)));

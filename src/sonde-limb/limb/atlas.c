@@ -27,11 +27,6 @@ typedef struct atlas {
   double (*outline)[2];
 } atlas;
 
-// Structures that are drawn by themselves; fat, skin and fascia are the ground.
-static bool is_drawn(sonde_limb_tissue tissue) {
-  return tissue == SONDE_LIMB_MUSCLE || tissue == SONDE_LIMB_TENDON || tissue >= SONDE_LIMB_NODE;
-}
-
 // Labels of all pixels as numbers of structures + 1.
 static void label_pixels(atlas *a) {
   for (uint32_t j = 1; j + 1 < PIXELS; ++j)
@@ -39,7 +34,10 @@ static void label_pixels(atlas *a) {
       sonde_vec3 p = vec3(a->centre.x + (i + 0.5 - PIXELS / 2) * a->metres,
                           a->centre.y - (j + 0.5 - PIXELS / 2) * a->metres, a->centre.z);
       sonde_limb_label label = sonde_limb_at(a->limb, p);
-      if (!is_drawn(label.tissue)) continue;
+      // Fat, skin and fascia are the ground; the others are drawn by themselves.
+      if (label.tissue != SONDE_LIMB_MUSCLE && label.tissue != SONDE_LIMB_TENDON &&
+          label.tissue < SONDE_LIMB_NODE)
+        continue;
       uint32_t k = 0;
       while (k < a->count &&
              (a->list[k].label.tissue != label.tissue || a->list[k].label.index != label.index))

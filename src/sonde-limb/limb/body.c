@@ -35,29 +35,6 @@ static sonde_status check_range(const sonde_limb_parameter *p, double value, son
                     value / p->unit, p->low / p->unit, p->high / p->unit, p->text);
 }
 
-// Refuses pairs of parameters that no body has together.
-static sonde_status check_together(const sonde_limb_body *b, sonde_error *error) {
-  struct pair {
-    const char *first, *second;
-    double ratio, low, high;
-  } const pairs[] = {
-      {"thigh-length-mm", "stature-cm", b->thigh_length_m / b->stature_m, 0.2, 0.29},
-      {"calf-length-mm", "stature-cm", b->calf_length_m / b->stature_m, 0.17, 0.28},
-      {"girth-knee-mm", "girth-thigh-mm", b->girth_knee_m / b->girth_thigh_m, 0.45, 0.92},
-      {"girth-calf-mm", "girth-thigh-mm", b->girth_calf_m / b->girth_thigh_m, 0.4, 0.92},
-      {"girth-ankle-mm", "girth-calf-mm", b->girth_ankle_m / b->girth_calf_m, 0.4, 0.82},
-      {"epicondylar-mm", "girth-knee-mm", b->epicondylar_m / b->girth_knee_m, 0.12, 0.285},
-      {"femoral-head-mm", "epicondylar-mm", b->head_m / b->epicondylar_m, 0.42, 0.75},
-      {"plateau-mm", "epicondylar-mm", b->plateau_m / b->epicondylar_m, 0.75, 1.15},
-      {"malleoli-mm", "girth-ankle-mm", b->malleoli_m / b->girth_ankle_m, 0.22, 0.42}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(pairs); ++k)
-    if (!(pairs[k].ratio >= pairs[k].low && pairs[k].ratio <= pairs[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %.3g of %s, expected %g to %g",
-                        pairs[k].first, pairs[k].ratio, pairs[k].second, pairs[k].low,
-                        pairs[k].high);
-  return SONDE_OK;
-}
-
 typedef struct draw {
   sonde_limb_body *body;
   uint64_t seed;
@@ -173,27 +150,6 @@ static void draw_fat(const draw *d) {
   fat(d, &b->fat_shin_m, (w ? 0.0033 : 0.0025) * sqrt(calf), 0.2);
 }
 
-// Bones grow with stature by the power that keeps their tabled means.
-static void draw_bones(const draw *d) {
-  sonde_limb_body *b = d->body;
-  double size = b->stature_m / (d->female ? 1.628 : 1.756), degree = SONDE_PI / 180;
-  normal(d, &b->head_m, 0.048 * size, 0.0425 * size, 0.0017, 0.0015);
-  normal(d, &b->offset_m, 0.043 * size, 0.038 * size, 0.0055, 0.0055);
-  normal(d, &b->neck_shaft_rad, 129 * degree, 129 * degree, 6 * degree, 6 * degree);
-  normal(d, &b->anteversion_rad, 10 * degree, 13 * degree, 8 * degree, 8 * degree);
-  normal(d, &b->shaft_m, 0.0275 * size, 0.025 * size, 0.0015, 0.0014);
-  normal(d, &b->bow_m, 1.15 * size, 1.1 * size, 0.2, 0.2);
-  normal(d, &b->epicondylar_m, 0.084 * size, 0.075 * size, 0.0028, 0.0028);
-  double knee = b->epicondylar_m / (d->female ? 0.075 : 0.084);
-  normal(d, &b->condyle_m, 0.064 * knee, 0.058 * knee, 0.002, 0.002);
-  normal(d, &b->patella_m, 0.045 * knee, 0.040 * knee, 0.0025, 0.0025);
-  normal(d, &b->plateau_m, 0.0785 * knee, 0.069 * knee, 0.0015, 0.0015);
-  normal(d, &b->tibia_m, 0.0225 * size, 0.0205 * size, 0.0014, 0.0013);
-  normal(d, &b->torsion_rad, 27 * degree, 29 * degree, 7 * degree, 7 * degree);
-  normal(d, &b->fibula_m, 0.0125 * size, 0.0113 * size, 0.0009, 0.0008);
-  normal(d, &b->malleoli_m, 0.075 * size, 0.067 * size, 0.0027, 0.0027);
-}
-
 sonde_status sonde_limb_draw(const sonde_limb_body *known, uint64_t seed, sonde_limb_body *body,
                              sonde_error *error) {
   SONDE_ASSERT(known && body);
@@ -209,10 +165,45 @@ sonde_status sonde_limb_draw(const sonde_limb_body *known, uint64_t seed, sonde_
   draw d = {&drawn, seed, drawn.sex == SONDE_SEX_FEMALE};
   draw_frame(&d);
   draw_fat(&d);
-  draw_bones(&d);
+  // Bones grow with stature; their deviations leave the tabled ones in the population.
+  sonde_limb_body *b = &drawn;
+  double size = b->stature_m / (d.female ? 1.628 : 1.756), degree = SONDE_PI / 180;
+  normal(&d, &b->head_m, 0.048 * size, 0.0425 * size, 0.0017, 0.0015);
+  normal(&d, &b->offset_m, 0.043 * size, 0.038 * size, 0.0055, 0.0055);
+  normal(&d, &b->neck_shaft_rad, 129 * degree, 129 * degree, 6 * degree, 6 * degree);
+  normal(&d, &b->anteversion_rad, 10 * degree, 13 * degree, 8 * degree, 8 * degree);
+  normal(&d, &b->shaft_m, 0.0275 * size, 0.025 * size, 0.0015, 0.0014);
+  normal(&d, &b->bow_m, 1.15 * size, 1.1 * size, 0.2, 0.2);
+  normal(&d, &b->epicondylar_m, 0.084 * size, 0.075 * size, 0.0028, 0.0028);
+  double knee = b->epicondylar_m / (d.female ? 0.075 : 0.084);
+  normal(&d, &b->condyle_m, 0.064 * knee, 0.058 * knee, 0.002, 0.002);
+  normal(&d, &b->patella_m, 0.045 * knee, 0.040 * knee, 0.0025, 0.0025);
+  normal(&d, &b->plateau_m, 0.0785 * knee, 0.069 * knee, 0.0015, 0.0015);
+  normal(&d, &b->tibia_m, 0.0225 * size, 0.0205 * size, 0.0014, 0.0013);
+  normal(&d, &b->torsion_rad, 27 * degree, 29 * degree, 7 * degree, 7 * degree);
+  normal(&d, &b->fibula_m, 0.0125 * size, 0.0113 * size, 0.0009, 0.0008);
+  normal(&d, &b->malleoli_m, 0.075 * size, 0.067 * size, 0.0027, 0.0027);
   for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k)
     if (isnan(drawn.share[k])) drawn.share[k] = exp(0.12 * standard(&d, &drawn.share[k]));
-  sonde_status status = check_together(&drawn, error);
-  if (!status) *body = drawn;
-  return status;
+  // Pairs that no body has together are refused.
+  struct pair {
+    const char *first, *second;
+    double ratio, low, high;
+  } const pairs[] = {
+      {"thigh-length-mm", "stature-cm", b->thigh_length_m / b->stature_m, 0.2, 0.29},
+      {"calf-length-mm", "stature-cm", b->calf_length_m / b->stature_m, 0.17, 0.28},
+      {"girth-knee-mm", "girth-thigh-mm", b->girth_knee_m / b->girth_thigh_m, 0.45, 0.92},
+      {"girth-calf-mm", "girth-thigh-mm", b->girth_calf_m / b->girth_thigh_m, 0.4, 0.92},
+      {"girth-ankle-mm", "girth-calf-mm", b->girth_ankle_m / b->girth_calf_m, 0.4, 0.82},
+      {"epicondylar-mm", "girth-knee-mm", b->epicondylar_m / b->girth_knee_m, 0.12, 0.285},
+      {"femoral-head-mm", "epicondylar-mm", b->head_m / b->epicondylar_m, 0.42, 0.75},
+      {"plateau-mm", "epicondylar-mm", b->plateau_m / b->epicondylar_m, 0.75, 1.15},
+      {"malleoli-mm", "girth-ankle-mm", b->malleoli_m / b->girth_ankle_m, 0.22, 0.42}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(pairs); ++k)
+    if (!(pairs[k].ratio >= pairs[k].low && pairs[k].ratio <= pairs[k].high))
+      return sonde_fail(error, SONDE_ARGUMENT, "%s is %.3g of %s, expected %g to %g",
+                        pairs[k].first, pairs[k].ratio, pairs[k].second, pairs[k].low,
+                        pairs[k].high);
+  *body = drawn;
+  return SONDE_OK;
 }

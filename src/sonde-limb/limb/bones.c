@@ -155,35 +155,6 @@ static void add_lower(maker *m, const sonde_limb *limb) {
                 vec3(10 * MM * fibula, 12 * MM * fibula, 13 * MM * fibula));
 }
 
-// The part of the pelvis beside the groin: acetabulum, superior ramus, column to the ilium and to
-// the ischium, in one piece.
-static void add_pelvis(maker *m, const sonde_limb *limb) {
-  double k = limb->scale * MM, head = limb->body.head_m / 2;
-  double cup = head / 0.024, far = 0.3;
-  add_ellipsoid(m, LIMB_ELLIPSOID, vec3(8 * MM * cup, 1 * MM * cup, 8 * MM * cup),
-                vec3(30 * MM * cup, 31 * MM * cup, 31 * MM * cup));
-  // The socket's rim: a plane, as a ball of 300 mm, cuts the cup on the lateral side and below.
-  sonde_vec3 rim = v_scale(v_unit(vec3(-0.75, 0.2, -0.62), vec3(0, 0, 0)), far + 0.003);
-  add_ellipsoid(m, LIMB_HOLLOW, rim, vec3(far, far, far));
-  add_cone(m, vec3(22 * k, 20 * k, 16 * k), 10 * k, vec3(44 * k, 34 * k, 4 * k), 7.5 * k);
-  add_cone(m, vec3(44 * k, 34 * k, 4 * k), 7.5 * k, vec3(57 * k, 37 * k, -6 * k), 7.5 * k);
-  add_cone(m, vec3(4 * k, -4 * k, 30 * k), 19 * k, vec3(-12 * k, -4 * k, 86 * k), 15 * k);
-  add_cone(m, vec3(0, 8 * k, 36 * k), 13 * k, vec3(-24 * k, 36 * k, 60 * k), 8 * k);
-  add_cone(m, vec3(12 * k, -22 * k, -4 * k), 15 * k, vec3(18 * k, -46 * k, -40 * k), 13 * k);
-  double socket = head + 2.2 * MM;
-  add_ellipsoid(m, LIMB_HOLLOW, vec3(0, 0, 0), vec3(socket, socket, socket));
-}
-
-static double ellipsoid_distance(const limb_solid *s, sonde_vec3 p) {
-  sonde_vec3 d = v_sub(p, s->a);
-  double x = d.x / s->b.x, y = d.y / s->b.y, z = d.z / s->b.z;
-  double k0 = sqrt(x * x + y * y + z * z);
-  double gx = x / s->b.x, gy = y / s->b.y, gz = z / s->b.z;
-  double k1 = sqrt(gx * gx + gy * gy + gz * gz);
-  if (k1 < 1e-9) return -fmin(s->b.x, fmin(s->b.y, s->b.z));
-  return k0 * (k0 - 1) / k1;
-}
-
 static double sweep_distance(const limb_sweep *s, sonde_vec3 p) {
   double at = clamp((p.z - s->low) / (s->high - s->low), 0, 1) * (LIMB_SWEEP_ROWS - 1);
   uint32_t k = (uint32_t)fmin(at, LIMB_SWEEP_ROWS - 2);
@@ -206,12 +177,6 @@ static double sweep_distance(const limb_sweep *s, sonde_vec3 p) {
   return fmax(along, across);
 }
 
-static double cone_distance(const limb_solid *s, sonde_vec3 p) {
-  sonde_vec3 axis = v_sub(s->b, s->a), d = v_sub(p, s->a);
-  double u = clamp(v_dot(d, axis) / v_norm2(axis), 0, 1);
-  return v_distance(d, v_scale(axis, u)) - (s->r0 + u * (s->r1 - s->r0));
-}
-
 double limb_one_bone(const struct limb_bones *bones, uint32_t bone, sonde_vec3 p) {
   SONDE_ASSERT(bone < SONDE_LIMB_BONES);
   const double blend = 0.006, reach = 0.03;
@@ -219,12 +184,22 @@ double limb_one_bone(const struct limb_bones *bones, uint32_t bone, sonde_vec3 p
   for (uint32_t i = bones->first[bone]; i < bones->first[bone + 1]; ++i) {
     const limb_solid *s = &bones->solid[i];
     double gap = fmax(s->low - p.z, p.z - s->high), d;
-    if (gap > reach)
+    if (gap > reach) {
       d = gap;
-    else if (s->kind == LIMB_SWEEP)
+    } else if (s->kind == LIMB_SWEEP) {
       d = sweep_distance(&bones->sweep[s->sweep], p);
-    else
-      d = s->kind == LIMB_CONE ? cone_distance(s, p) : ellipsoid_distance(s, p);
+    } else if (s->kind == LIMB_CONE) {
+      // To the axis, less the radius at its nearest point.
+      sonde_vec3 axis = v_sub(s->b, s->a), from = v_sub(p, s->a);
+      double u = clamp(v_dot(from, axis) / v_norm2(axis), 0, 1);
+      d = v_distance(from, v_scale(axis, u)) - (s->r0 + u * (s->r1 - s->r0));
+    } else {
+      // The implicit function over its gradient's length.
+      sonde_vec3 from = v_sub(p, s->a);
+      sonde_vec3 q = vec3(from.x / s->b.x, from.y / s->b.y, from.z / s->b.z);
+      double k0 = v_norm(q), k1 = v_norm(vec3(q.x / s->b.x, q.y / s->b.y, q.z / s->b.z));
+      d = k1 < 1e-9 ? -fmin(s->b.x, fmin(s->b.y, s->b.z)) : k0 * (k0 - 1) / k1;
+    }
     if (s->kind == LIMB_HOLLOW) {
       double h = fmax(blend - fabs(distance + d), 0) / blend;
       distance = fmax(distance, -d) + 0.25 * h * h * blend;
@@ -259,7 +234,22 @@ sonde_status limb_bones_make(sonde_limb *limb, sonde_error *error) {
   struct limb_bones *bones = limb->bones = SONDE_NEW(struct limb_bones, 1);
   if (!bones) return sonde_fail_memory(error);
   maker m = {bones};
-  add_pelvis(&m, limb);
+  // The part of the pelvis beside the groin: socket, superior ramus, columns to the ilium and to
+  // the ischium, in one piece.
+  double k = limb->scale * MM, head = limb->body.head_m / 2;
+  double cup = head / 0.024, far = 0.3;
+  add_ellipsoid(&m, LIMB_ELLIPSOID, vec3(8 * MM * cup, 1 * MM * cup, 8 * MM * cup),
+                vec3(30 * MM * cup, 31 * MM * cup, 31 * MM * cup));
+  // The socket's rim: a plane, as a ball of 300 mm, cuts the cup on the lateral side and below.
+  sonde_vec3 rim = v_scale(v_unit(vec3(-0.75, 0.2, -0.62), vec3(0, 0, 0)), far + 0.003);
+  add_ellipsoid(&m, LIMB_HOLLOW, rim, vec3(far, far, far));
+  add_cone(&m, vec3(22 * k, 20 * k, 16 * k), 10 * k, vec3(44 * k, 34 * k, 4 * k), 7.5 * k);
+  add_cone(&m, vec3(44 * k, 34 * k, 4 * k), 7.5 * k, vec3(57 * k, 37 * k, -6 * k), 7.5 * k);
+  add_cone(&m, vec3(4 * k, -4 * k, 30 * k), 19 * k, vec3(-12 * k, -4 * k, 86 * k), 15 * k);
+  add_cone(&m, vec3(0, 8 * k, 36 * k), 13 * k, vec3(-24 * k, 36 * k, 60 * k), 8 * k);
+  add_cone(&m, vec3(12 * k, -22 * k, -4 * k), 15 * k, vec3(18 * k, -46 * k, -40 * k), 13 * k);
+  double socket = head + 2.2 * MM;
+  add_ellipsoid(&m, LIMB_HOLLOW, vec3(0, 0, 0), vec3(socket, socket, socket));
   bones->first[SONDE_LIMB_FEMUR] = bones->count;
   add_femur(&m, limb);
   add_lower(&m, limb);
@@ -267,12 +257,12 @@ sonde_status limb_bones_make(sonde_limb *limb, sonde_error *error) {
   // Cut where the limb ends, 2 mm inside, so that the skin closes over the bones.
   bones->foot = limb_z(limb, 2) + 0.002;
   bones->top = limb_z(limb, LIMB_TOP) - 0.002;
-  for (uint32_t k = 0; k < SONDE_LIMB_BONES; ++k) {
-    bones->low[k] = INFINITY, bones->high[k] = -INFINITY;
-    for (uint32_t i = bones->first[k]; i < bones->first[k + 1]; ++i) {
+  for (uint32_t bone = 0; bone < SONDE_LIMB_BONES; ++bone) {
+    bones->low[bone] = INFINITY, bones->high[bone] = -INFINITY;
+    for (uint32_t i = bones->first[bone]; i < bones->first[bone + 1]; ++i) {
       if (bones->solid[i].kind == LIMB_HOLLOW) continue;
-      bones->low[k] = fmin(bones->low[k], bones->solid[i].low - 0.003);
-      bones->high[k] = fmax(bones->high[k], bones->solid[i].high + 0.003);
+      bones->low[bone] = fmin(bones->low[bone], bones->solid[i].low - 0.003);
+      bones->high[bone] = fmax(bones->high[bone], bones->solid[i].high + 0.003);
     }
   }
   return SONDE_OK;

@@ -31,23 +31,6 @@ static const struct septum {
              {LIMB_LEG_ANTERIOR, LIMB_LEG_DEEP, "interosseous membrane"},
              {LIMB_FILLING, LIMB_FILLING, "vastoadductor membrane"}};
 
-// The septum between two cells; -1: none.
-static int septum_between(uint32_t cell, uint32_t other, double level) {
-  SONDE_ASSERT(cell < LIMB_CELLS && other < LIMB_CELLS);
-  const uint32_t sartorius = 0;
-  if ((cell == sartorius || other == sartorius) && level > 0.51 && level < 0.72)
-    return (int)SONDE_COUNT_OF(SEPTA) - 1;
-  limb_compartment a = limb_cell_compartment(cell), b = limb_cell_compartment(other);
-  if (a > b) {
-    limb_compartment c = a;
-    a = b, b = c;
-  }
-  if (a == b) return -1;
-  for (size_t k = 0; k + 1 < SONDE_COUNT_OF(SEPTA); ++k)
-    if (SEPTA[k].a == a && SEPTA[k].b == b) return (int)k;
-  return -1;
-}
-
 static sonde_vec3 to_right(const sonde_limb *limb, sonde_vec3 p) {
   if (limb->body.side == SONDE_LIMB_LEFT) p.x = -p.x;
   return p;
@@ -103,7 +86,15 @@ sonde_limb_label sonde_limb_at(const sonde_limb *limb, sonde_vec3 point) {
     return label;
   }
   limb_cell cell = limb_cell_at(limb, level, x, y);
-  int septum = cell.boundary_m < SEPTUM_M / 2 ? septum_between(cell.cell, cell.second, level) : -1;
+  int septum = -1;
+  if (cell.boundary_m < SEPTUM_M / 2) {
+    const uint32_t sartorius = 0;
+    int a = (int)limb_cell_compartment(cell.cell), b = (int)limb_cell_compartment(cell.second);
+    for (size_t k = 0; k + 1 < SONDE_COUNT_OF(SEPTA) && a != b; ++k)
+      if ((int)SEPTA[k].a == (a < b ? a : b) && (int)SEPTA[k].b == (a < b ? b : a)) septum = (int)k;
+    if ((cell.cell == sartorius || cell.second == sartorius) && level > 0.51 && level < 0.72)
+      septum = (int)SONDE_COUNT_OF(SEPTA) - 1;
+  }
   if (septum >= 0)
     label.tissue = SONDE_LIMB_SEPTUM, label.index = (uint32_t)septum;
   else if (cell.cell >= SONDE_LIMB_MUSCLES || cell.boundary_m < MUSCLE_GAP_M / 2)

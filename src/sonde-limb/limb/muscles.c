@@ -236,34 +236,6 @@ static void solve_row(struct limb_muscles *m, uint32_t row, const section *s) {
   for (uint32_t k = 0; k < LIMB_CELLS; ++k) m->area[row][k] = area[k] * unit;
 }
 
-// Areas of a row: muscles by their rule times a common scale, fat for its share and for what muscle
-// does not fill.
-static void set_targets(const sonde_limb *limb, uint32_t row, double level, double room) {
-  struct limb_muscles *m = limb->muscles;
-  double muscle = 0, share[LIMB_FILLERS], fat = 0;
-  for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) {
-    double area = limb_muscle_area(&limb->body, k, level);
-    m->target[row][k] = area < LEAST_AREA ? 0 : area;
-    muscle += m->target[row][k];
-  }
-  for (uint32_t k = 0; k < LIMB_FILLERS; ++k) {
-    share[k] = KNOTS(FILLERS[k].share, 1, level);
-    if (share[k] < 0.003) share[k] = 0;
-    fat += share[k];
-  }
-  double scale = muscle > 0 ? (1 - fat) * room / muscle : 1;
-  double elastic = fat - share[0]; // the fat of the femoral triangle keeps its share
-  if (elastic > 0 && scale > MOST_SCALE) {
-    double more = ((1 - share[0]) * room - MOST_SCALE * muscle) / (elastic * room);
-    for (uint32_t k = 1; k < LIMB_FILLERS; ++k) share[k] *= more;
-    scale = MOST_SCALE;
-  }
-  m->scale[row] = scale;
-  for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) m->target[row][k] *= scale;
-  for (uint32_t k = 0; k < LIMB_FILLERS; ++k)
-    m->target[row][SONDE_LIMB_MUSCLES + k] = share[k] * room;
-}
-
 sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
   SONDE_ASSERT(limb && limb->bones && !limb->muscles);
   struct limb_muscles *m = limb->muscles = SONDE_NEW(struct limb_muscles, 1);
@@ -296,7 +268,31 @@ sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
     for (uint32_t k = 0; row && k < m->seed_count; ++k)
       m->seed[row][k].weight = m->seed[row - 1][k].weight;
     sample_section(limb, level, mean, s);
-    set_targets(limb, row, level, s->count * s->cell_area * mean * mean);
+    // Areas of the row: muscles by their rule times a common scale, fat for its share and for what
+    // muscle does not fill.
+    double room = s->count * s->cell_area * mean * mean;
+    double muscle = 0, share[LIMB_FILLERS], fat = 0;
+    for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) {
+      double area = limb_muscle_area(&limb->body, k, level);
+      m->target[row][k] = area < LEAST_AREA ? 0 : area;
+      muscle += m->target[row][k];
+    }
+    for (uint32_t k = 0; k < LIMB_FILLERS; ++k) {
+      share[k] = KNOTS(FILLERS[k].share, 1, level);
+      if (share[k] < 0.003) share[k] = 0;
+      fat += share[k];
+    }
+    double scale = muscle > 0 ? (1 - fat) * room / muscle : 1;
+    double elastic = fat - share[0]; // the fat of the femoral triangle keeps its share
+    if (elastic > 0 && scale > MOST_SCALE) {
+      double more = ((1 - share[0]) * room - MOST_SCALE * muscle) / (elastic * room);
+      for (uint32_t k = 1; k < LIMB_FILLERS; ++k) share[k] *= more;
+      scale = MOST_SCALE;
+    }
+    m->scale[row] = scale;
+    for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) m->target[row][k] *= scale;
+    for (uint32_t k = 0; k < LIMB_FILLERS; ++k)
+      m->target[row][SONDE_LIMB_MUSCLES + k] = share[k] * room;
     solve_row(m, row, s);
   }
   for (uint32_t row = 0; row + 1 < LIMB_CELL_ROWS; ++row)

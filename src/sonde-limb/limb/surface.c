@@ -161,19 +161,6 @@ static double fat_at(const sonde_limb_body *b, double level, double angle) {
              0.25 * (f + p - m - l) * cos(2 * angle));
 }
 
-// Length of the closed curve of radii around[LIMB_ANGLES] times `factor` plus outside[].
-static double girth_of(const double *around, double factor, const double *outside) {
-  double length = 0, x0 = 0, y0 = 0;
-  for (uint32_t i = 0; i <= LIMB_ANGLES; ++i) {
-    uint32_t c = i % LIMB_ANGLES;
-    double angle = 2 * SONDE_PI * c / LIMB_ANGLES, r = factor * around[c] + outside[c];
-    double x = r * sin(angle), y = r * cos(angle);
-    if (i) length += hypot(x - x0, y - y0);
-    x0 = x, y0 = y;
-  }
-  return length;
-}
-
 // Shape of the fascia at a level up to its size: harmonics 2 and 3, and the first harmonic that
 // brings the centroid back to the centre.
 static void shape_at(double level, double *around) {
@@ -223,7 +210,16 @@ static double fit_section(const double *around, const double *bone, const double
       double r = size * around[c], gap = r - bone[c];
       radius[c] = bone[c] > 0 ? 0.5 * (r + bone[c] + sqrt(gap * gap + fold * fold)) : r;
     }
-    size += (wanted - girth_of(radius, 1, outside)) / (2 * SONDE_PI);
+    // Girth of the skin that this fascia has.
+    double girth = 0, x0 = 0, y0 = 0;
+    for (uint32_t i = 0; i <= LIMB_ANGLES; ++i) {
+      uint32_t c = i % LIMB_ANGLES;
+      double angle = 2 * SONDE_PI * c / LIMB_ANGLES, r = radius[c] + outside[c];
+      double x = r * sin(angle), y = r * cos(angle);
+      if (i) girth += hypot(x - x0, y - y0);
+      x0 = x, y0 = y;
+    }
+    size += (wanted - girth) / (2 * SONDE_PI);
   }
   return size;
 }
@@ -302,7 +298,8 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
     sonde_vec3 centre = vec3(s->x[r], s->y[r], limb_z(limb, level));
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
       double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
-      bone[r][c] = bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], 0.0012);
+      bone[r][c] =
+          bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], level < 0.15 ? 0.0022 : 0.0012);
       outside[c] = s->fat[r][c] + b->skin_m;
     }
     fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
@@ -317,7 +314,10 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
         double w = SPREAD + 1 - abs(k);
         sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
       }
-      around[r][c] = fmax(s->fascia[r][c] + sum / weights, bone[r][c]);
+      double reach = bone[r][c]; // also of the rows beside, for what ends between two rows
+      if (r > 0) reach = fmax(reach, bone[r - 1][c]);
+      if (r + 1 < LIMB_ROWS) reach = fmax(reach, bone[r + 1][c]);
+      around[r][c] = fmax(s->fascia[r][c] + sum / weights, reach);
     }
   }
   memcpy(s->fascia, around, sizeof s->fascia);

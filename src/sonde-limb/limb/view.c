@@ -68,35 +68,6 @@ static sonde_status put_bones(const view *v, sonde_file *file, sonde_error *erro
   return status;
 }
 
-// The skin: its silhouette as a veil, and rings every tenth of a segment on the near side.
-static void put_skin(const view *v, sonde_file *file) {
-  enum { STEPS = 160, AROUND = 90 };
-  double edge[2 * STEPS][2];
-  for (uint32_t k = 0; k < STEPS; ++k) {
-    double level = LIMB_TOP + (2 - LIMB_TOP) * k / (STEPS - 1), low = INFINITY, high = -INFINITY,
-           y = 0;
-    sonde_vec3 c = limb_centre(v->limb, level);
-    double ring[AROUND][2];
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < AROUND; ++i) {
-      double angle = 2 * SONDE_PI * i / AROUND + (v->side ? 0 : -SONDE_PI),
-             r = limb_skin_radius(v->limb, level, angle);
-      sonde_vec3 p =
-          project(v, vec3(v->mirror * (c.x + r * sin(angle)), c.y + r * cos(angle), c.z));
-      low = fmin(low, p.x), high = fmax(high, p.x), y = p.y;
-      bool near = v->side == 0 ? cos(angle) > 0 : sin(angle) > 0;
-      if (near) ring[count][0] = p.x, ring[count++][1] = p.y;
-    }
-    edge[k][0] = low, edge[k][1] = y;
-    edge[2 * STEPS - 1 - k][0] = high, edge[2 * STEPS - 1 - k][1] = y;
-    if (k % 8 == 0 && count > 1)
-      sonde_svg_put_line(file, (const double(*)[2])ring, count,
-                         "fill='none' stroke='#a8674a' stroke-opacity='.35' stroke-width='.6'");
-  }
-  sonde_svg_put_outlines(file, (const double(*)[2])edge, 2 * STEPS, 2 * STEPS,
-                         "fill='#d99b78' fill-opacity='.28' stroke='#7d5138' stroke-width='1'");
-}
-
 sonde_status sonde_limb_view_svg(const sonde_limb *limb, const char *path, sonde_error *error) {
   SONDE_ASSERT(limb && path);
   sonde_file *file = NULL;
@@ -108,7 +79,32 @@ sonde_status sonde_limb_view_svg(const sonde_limb *limb, const char *path, sonde
   sonde_svg_begin(file, "Lower limb", VIEW_WIDTH, VIEW_HEIGHT);
   for (v.side = 0; v.side < 2 && !status; ++v.side) {
     status = put_bones(&v, file, error);
-    if (!status) put_skin(&v, file);
+    // The skin: its silhouette as a veil, and rings every tenth of a segment on the near side.
+    enum { STEPS = 160, AROUND = 90 };
+    double edge[2 * STEPS][2];
+    for (uint32_t k = 0; k < STEPS; ++k) {
+      double level = LIMB_TOP + (2 - LIMB_TOP) * k / (STEPS - 1), low = INFINITY, high = -INFINITY,
+             y = 0;
+      sonde_vec3 c = limb_centre(v.limb, level);
+      double ring[AROUND][2];
+      uint32_t count = 0;
+      for (uint32_t i = 0; i < AROUND; ++i) {
+        double angle = 2 * SONDE_PI * i / AROUND + (v.side ? 0 : -SONDE_PI),
+               r = limb_skin_radius(v.limb, level, angle);
+        sonde_vec3 p =
+            project(&v, vec3(v.mirror * (c.x + r * sin(angle)), c.y + r * cos(angle), c.z));
+        low = fmin(low, p.x), high = fmax(high, p.x), y = p.y;
+        bool near = v.side == 0 ? cos(angle) > 0 : sin(angle) > 0;
+        if (near) ring[count][0] = p.x, ring[count++][1] = p.y;
+      }
+      edge[k][0] = low, edge[k][1] = y;
+      edge[2 * STEPS - 1 - k][0] = high, edge[2 * STEPS - 1 - k][1] = y;
+      if (k % 8 == 0 && count > 1)
+        sonde_svg_put_line(file, (const double(*)[2])ring, count,
+                           "fill='none' stroke='#a8674a' stroke-opacity='.35' stroke-width='.6'");
+    }
+    sonde_svg_put_outlines(file, (const double(*)[2])edge, 2 * STEPS, 2 * STEPS,
+                           "fill='#d99b78' fill-opacity='.28' stroke='#7d5138' stroke-width='1'");
     sonde_svg_put_text(file, LEFT[v.side], 34, "class='head middle'",
                        v.side == 0
                            ? (left ? "Left limb from the front" : "Right limb from the front")
