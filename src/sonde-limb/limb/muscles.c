@@ -138,7 +138,7 @@ typedef struct section {
 // Points of a square grid within the fascia and outside bones and vessels.
 static void sample_section(const sonde_limb *limb, double level, double radius, section *s) {
   sonde_vec3 c = limb_centre(limb, level);
-  s->count = 0, s->spacing = 0.082, s->cell_area = s->spacing * s->spacing;
+  s->count = 0, s->spacing = 0.058, s->cell_area = s->spacing * s->spacing;
   for (double y = -1.7; y < 1.7; y += s->spacing)
     for (double x = -1.7; x < 1.7; x += s->spacing) {
       double r = radius * sqrt(x * x + y * y);

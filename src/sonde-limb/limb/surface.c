@@ -299,7 +299,7 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
       double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
       bone[r][c] =
-          bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], level < 0.15 ? 0.0022 : 0.0012);
+          bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], level < 0.15 ? 0.003 : 0.0012);
       outside[c] = s->fat[r][c] + b->skin_m;
     }
     fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
