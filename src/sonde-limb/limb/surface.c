@@ -314,9 +314,10 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
         double w = SPREAD + 1 - abs(k);
         sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
       }
-      // Also what reaches the rows and, at the small ends of the pelvis, the angles beside.
+      // Also what reaches the rows and, at pelvis and patella, the angles beside.
       double reach = 0;
-      int aside = LIMB_TOP + r * LIMB_STEP < 0.15 ? 1 : 0;
+      double level = LIMB_TOP + r * LIMB_STEP;
+      int aside = level < 0.15 || fabs(level - 0.95) < 0.1 ? 1 : 0;
       for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
         for (int q = -aside; q <= aside; ++q)
           reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
