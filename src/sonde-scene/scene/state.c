@@ -115,16 +115,6 @@ static void lay_arrays(sonde_scene_state *s, carver *c) {
   CARVE(s->bond_sum, s->bond_capacity);
 }
 
-static sonde_status make_tree(sonde_scene_state *state, uint32_t b, sonde_error *error) {
-  SONDE_ASSERT(b < state->scene->body_count);
-  if (state->tree[b]) return SONDE_OK;
-  sonde_vec3 *surface = state->surface + state->surface_first[b];
-  sonde_mesh mesh = state->scene->bodies[b].surface;
-  sonde_surface_at(state, b, state->now.position, state->now.rotation, surface);
-  mesh.vertices = surface;
-  return sonde_face_tree_create(&mesh, &state->tree[b], error);
-}
-
 static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   // Room for contact: columns with a push and two tangents each, regions over all vertices twice.
   const sonde_scene *scene = state->scene;
@@ -218,7 +208,11 @@ static sonde_status make_overlaps(sonde_scene_state *state, sonde_error *error) 
       pieces += 16 * mesh->face_count;
       if (mesh->face_count > config[k].max_faces) config[k].max_faces = mesh->face_count;
       if (mesh->vertex_count > config[k].max_vertices) config[k].max_vertices = mesh->vertex_count;
-      status = make_tree(state, ends[s], error);
+      if (state->tree[ends[s]]) continue;
+      sonde_mesh start = *mesh;
+      start.vertices = state->surface + state->surface_first[ends[s]];
+      sonde_surface_at(state, ends[s], state->now.position, state->now.rotation, start.vertices);
+      status = sonde_face_tree_create(&start, &state->tree[ends[s]], error);
     }
     if (pieces > config[k].max_pieces) config[k].max_pieces = pieces;
     tree[k] = state->tree[touch->a];

@@ -70,13 +70,6 @@ typedef struct stuffing {
   uint32_t room; // for tetrahedra
 } stuffing;
 
-static void clear_stuffing(stuffing *s) {
-  sonde_lattice_clear(&s->lattice);
-  sonde_index_map_clear(&s->edges);
-  void *parts[] = {s->point, s->distance, s->on_inner, s->node, s->crossing};
-  for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
-}
-
 static uint64_t edge_key(uint32_t a, uint32_t b) {
   return a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
 }
@@ -518,7 +511,10 @@ sonde_status sonde_tetrahedralise(const sonde_mesh *outer, const sonde_mesh *inn
     status = sonde_mesh_inspect(outer, &report, error);
     if (!status) status = check_filled(t, volume - hollow, report.area_m2, def.edge_m, error);
   }
-  clear_stuffing(&s);
+  sonde_lattice_clear(&s.lattice);
+  sonde_index_map_clear(&s.edges);
+  void *parts[] = {s.point, s.distance, s.on_inner, s.node, s.crossing};
+  for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
   sonde_surface_index_destroy(domain.outer);
   sonde_surface_index_destroy(domain.inner);
   sonde_free(kind);
