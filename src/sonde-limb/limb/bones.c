@@ -139,9 +139,9 @@ static void add_lower(maker *m, const sonde_limb *limb) {
   // Fibula: lateral and behind.
   bones->first[SONDE_LIMB_FIBULA] = bones->count;
   const double axis[][4] = {
-      {0.03, -39.5, -24, 10.5},  {0.07, -39.5, -24, 9},   {0.11, -37.5, -24, 6.5},
-      {0.25, -34, -22.5, 6.2},   {0.5, -31, -20, 6.3},    {0.75, -26.5, -14, 6.2},
-      {0.88, -24.5, -11.5, 6.5}, {0.95, -26, -11.5, 8.5}, {1, -28, -12, 9.5}};
+      {0.03, -41, -25.2, 10.3},  {0.07, -41, -25.2, 8.8},   {0.11, -37.5, -24, 6.5},
+      {0.25, -34, -22.5, 6.2},   {0.5, -31, -20, 6.3},      {0.75, -26.5, -14, 6.2},
+      {0.88, -24.5, -11.5, 6.5}, {0.95, -27.5, -12.2, 8.3}, {1, -30, -13, 9.2}};
   s = &bones->sweep[2];
   s->high = -lt - 0.045 * lc, s->low = -lt - lc, s->turn = 1;
   for (uint32_t r = 0; r < LIMB_SWEEP_ROWS; ++r) {
@@ -151,7 +151,7 @@ static void add_lower(maker *m, const sonde_limb *limb) {
                                  0.95 * radius, 1.05 * radius, 0.07};
   }
   add(m, (limb_solid){.kind = LIMB_SWEEP, .sweep = 2, .low = s->low, .high = s->high});
-  add_ellipsoid(m, LIMB_ELLIPSOID, vec3(-40 * MM * wide, -24.5 * MM * wide, -lt - 0.055 * lc),
+  add_ellipsoid(m, LIMB_ELLIPSOID, vec3(-41.5 * MM * wide, -26 * MM * wide, -lt - 0.055 * lc),
                 vec3(10 * MM * fibula, 12 * MM * fibula, 13 * MM * fibula));
 }
 
