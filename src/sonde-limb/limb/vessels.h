@@ -11,7 +11,7 @@ typedef enum limb_part {
   LIMB_PART_WALL,
   LIMB_PART_NERVE,
   LIMB_PART_NODE,
-  LIMB_PART_SHEATH
+  LIMB_PART_SHEATH // loose fat around deep vessels; the femoral sheath
 } limb_part;
 
 typedef struct limb_vessel_hit {
@@ -26,5 +26,9 @@ void limb_vessels_destroy(struct limb_vessels *vessels);
 // What is at a point of a right limb. NULL vessels: nothing.
 limb_vessel_hit limb_vessels_at(const struct limb_vessels *vessels, const double xyz[3]);
 const char *limb_vessels_name(const struct limb_vessels *vessels, limb_part part, uint32_t index);
+
+// Distance to the outer face of the nearest deep bundle (wall, nerve) of a right limb that muscles
+// give way to; perforators and the veins inside soleus and gastrocnemius do not count.
+double limb_vessels_bundle(const struct limb_vessels *vessels, const double xyz[3]);
 
 #endif

@@ -1,0 +1,272 @@
+// Nearest vessel and nerve at a point: a tree of eighths whose leaves list the pieces that can be
+// nearest to a point of the leaf, or within the width of a rounded joint of the nearest.
+#include "limb/vessels_graph.h"
+
+#include <string.h>
+
+enum { LEAF_PIECES = 12, DEEPEST = 7 };
+// A cube farther than 50 mm from every piece keeps the one that is nearest to its middle; one with
+// few pieces stays whole where they are far for its size.
+enum { FAR_PIECES = 24 };
+static const double FAR_M = 0.05, FAR = 2;
+static const double SLACK_M =
+    0.0025; // by which a piece may be farther than the nearest and still count
+static const double SHEATH_M = 0.0009; // loose fat around the walls of deep vessels
+
+// Signed distance of a point to a piece; *t: place between its ends.
+static inline double piece_distance(const vessel_piece *p, sonde_vec3 at, double *t) {
+  sonde_vec3 off = v_sub(at, p->a);
+  double u = v_dot(off, p->along) * p->inverse;
+  u = u < 0 ? 0 : u > 1 ? 1 : u;
+  off = v_madd(off, -u, p->along);
+  if (p->half > 0) {
+    double side = v_dot(off, p->side);
+    off = v_madd(off, -clamp(side, -p->half, p->half), p->side);
+  }
+  *t = u;
+  return sqrt(v_norm2(off)) - p->radius - u * p->grows;
+}
+
+// ---- making -------------------------------------------------------------------------------------
+
+static vessel_piece piece_between(sonde_vec3 a, sonde_vec3 b, double from, double to,
+                                  uint32_t owner, uint32_t at) {
+  sonde_vec3 along = v_sub(b, a);
+  double n2 = v_norm2(along);
+  return (vessel_piece){a,     along, n2 > 1e-16 ? 1 / n2 : 0, from, to - from, 0, vec3(0, 0, 0),
+                        owner, at};
+}
+
+typedef struct growing {
+  struct limb_vessels *v;
+  uint32_t cell_room, list_room;
+  bool failed;
+} growing;
+
+static bool reserve(growing *g, void **array, uint32_t *room, uint32_t needed, size_t size) {
+  if (needed <= *room) return true;
+  uint32_t more = needed + needed / 2 + 256;
+  void *grown = sonde_realloc(*array, *room * size, more * size);
+  if (!grown) return !(g->failed = true);
+  *array = grown, *room = more;
+  return true;
+}
+
+// Keeps of `from` the pieces that count in a cube of centre `middle` and half edge `half`.
+static void split(growing *g, uint32_t cell, const uint32_t *from, uint32_t count,
+                  sonde_vec3 middle, double half, uint32_t depth) {
+  struct limb_vessels *v = g->v;
+  double reach = half * sqrt(3.0), least = INFINITY, t;
+  uint32_t *kept = SONDE_NEW(uint32_t, count);
+  double *distance = SONDE_NEW(double, count);
+  uint32_t n = 0;
+  if (!kept || !distance) g->failed = true;
+  for (uint32_t k = 0; k < count && !g->failed; ++k) {
+    distance[k] = piece_distance(&v->piece[from[k]], middle, &t);
+    if (distance[k] < least) least = distance[k];
+  }
+  double slack = least - reach > SLACK_M ? 0 : SLACK_M; // joints are rounded near them only
+  for (uint32_t k = 0; k < count && !g->failed; ++k) {
+    if (least - reach > FAR_M && n > 0) break;
+    if (least - reach > FAR_M ? distance[k] <= least : distance[k] < least + 2 * reach + slack)
+      kept[n++] = from[k];
+  }
+  sonde_free(distance);
+  if (!g->failed &&
+      (depth >= DEEPEST || n <= LEAF_PIECES || (n <= FAR_PIECES && least > FAR * reach))) {
+    if (reserve(g, (void **)(void *)&v->listed, &g->list_room, v->listed_count + n,
+                sizeof *v->listed)) {
+      v->cell[cell] = (vessel_cell){0, v->listed_count, n};
+      memcpy(v->listed + v->listed_count, kept, n * sizeof *kept);
+      v->listed_count += n;
+    }
+  } else if (!g->failed &&
+             reserve(g, (void **)(void *)&v->cell, &g->cell_room, v->cells + 8, sizeof *v->cell)) {
+    uint32_t child = v->cells;
+    v->cell[cell] = (vessel_cell){child, 0, 0};
+    v->cells += 8;
+    for (uint32_t k = 0; k < 8 && !g->failed; ++k) {
+      double h = 0.5 * half;
+      sonde_vec3 at = v_add(middle, vec3(k & 1 ? h : -h, k & 2 ? h : -h, k & 4 ? h : -h));
+      split(g, child + k, kept, n, at, h, depth + 1);
+    }
+  }
+  sonde_free(kept);
+}
+
+sonde_status limb_vessels_index(struct limb_vessels *v, sonde_error *error) {
+  uint32_t most = v->places + LIMB_NERVES * 160;
+  sonde_free(v->piece);
+  sonde_free(v->cell);
+  sonde_free(v->listed);
+  v->cell = NULL, v->listed = NULL, v->cells = v->listed_count = 0;
+  v->piece = SONDE_NEW(vessel_piece, most);
+  if (!v->piece) return sonde_fail_memory(error);
+  v->pieces = 0;
+  for (uint32_t b = 0; b < v->branches; ++b)
+    for (uint32_t k = 0; k + 1 < v->branch[b].count; ++k) {
+      const vessel_place *p = limb_branch_places(v, b) + k;
+      v->piece[v->pieces++] = piece_between(v->node[p->node], v->node[p[1].node], p->radius,
+                                            p[1].radius, b, v->branch[b].first + k);
+    }
+  for (uint32_t k = 0; k < LIMB_NERVES; ++k)
+    for (uint32_t i = 0; i + 1 < v->nerve[k].count; ++i) {
+      const limb_nerve *nerve = &v->nerve[k];
+      vessel_piece piece = piece_between(nerve->point[i], nerve->point[i + 1], nerve->radius,
+                                         nerve->radius, v->branches + k, i);
+      piece.half = nerve->half, piece.side = nerve->side[i];
+      v->piece[v->pieces++] = piece;
+    }
+  sonde_vec3 low = v->piece[0].a, high = low;
+  for (uint32_t k = 0; k < v->pieces; ++k)
+    low = v_min(low, v->piece[k].a), high = v_max(high, v->piece[k].a);
+  double margin = 0.04,
+         edge = fmax(high.z - low.z, fmax(high.x - low.x, high.y - low.y)) + 2 * margin;
+  v->low = v_sub(v_scale(v_add(low, high), 0.5), vec3(edge / 2, edge / 2, edge / 2));
+  v->edge = edge;
+  growing g = {v, 0, 0, false};
+  uint32_t *all = SONDE_NEW(uint32_t, v->pieces);
+  if (!all || !reserve(&g, (void **)(void *)&v->cell, &g.cell_room, 1, sizeof *v->cell))
+    g.failed = true;
+  for (uint32_t k = 0; k < v->pieces && !g.failed; ++k) all[k] = k;
+  v->cells = 1;
+  if (!g.failed)
+    split(&g, 0, all, v->pieces, v_add(v->low, vec3(edge / 2, edge / 2, edge / 2)), edge / 2, 0);
+  sonde_free(all);
+  return g.failed ? sonde_fail_memory(error) : SONDE_OK;
+}
+
+// ---- asking -------------------------------------------------------------------------------------
+
+typedef struct nearest {
+  double lumen;        // joints rounded
+  uint32_t branch, at; // place before the nearest point
+  double t;
+  double nerve;
+  uint32_t which; // nerve
+} nearest;
+
+// Smooth minimum of two tubes around their joint: k = 0.3 radii there, fading within 3.5 radii.
+static double rounded(const struct limb_vessels *v, sonde_vec3 p, uint32_t a, double da, uint32_t b,
+                      double db) {
+  double least = fmin(da, db);
+  for (uint32_t k = 0; k < 2; ++k) {
+    if (!v->shared[a][b][k]) continue;
+    uint32_t node = v->shared[a][b][k] - 1u;
+    uint32_t tube = v->branch[a].parent == b ? a : b;
+    const vessel_branch *child = &v->branch[tube];
+    const vessel_place *end = &v->place[child->first];
+    if (end->node != node) end += child->count - 1;
+    double radius = end->radius, far = v_distance(p, v->node[node]) / (3.5 * radius + 1e-9);
+    double width = 0.3 * radius * clamp(2 - 2 * far, 0, 1), h = fmax(width - fabs(da - db), 0);
+    if (width > 0) least = fmin(least, fmin(da, db) - 0.25 * h * h / width);
+  }
+  return least;
+}
+
+static nearest find_nearest(const struct limb_vessels *v, sonde_vec3 p) {
+  enum { KEPT = 4 };
+  struct {
+    uint32_t branch, at;
+    double distance, t;
+  } best[KEPT];
+  uint32_t count = 0;
+  nearest out = {INFINITY, VESSEL_NONE, 0, 0, INFINITY, VESSEL_NONE};
+  // Down to the leaf; a point outside of the cube takes that of its nearest point.
+  const vessel_cell *leaf = v->cell;
+  sonde_vec3 low = v->low;
+  for (double edge = 0.5 * v->edge; leaf->child; edge *= 0.5) {
+    uint32_t k = 0;
+    if (p.x >= low.x + edge) k |= 1, low.x += edge;
+    if (p.y >= low.y + edge) k |= 2, low.y += edge;
+    if (p.z >= low.z + edge) k |= 4, low.z += edge;
+    leaf = &v->cell[leaf->child + k];
+  }
+  for (uint32_t k = 0; k < leaf->count; ++k) {
+    const vessel_piece *piece = &v->piece[v->listed[leaf->first + k]];
+    double t, d = piece_distance(piece, p, &t);
+    if (piece->owner >= v->branches) {
+      if (d < out.nerve) out.nerve = d, out.which = piece->owner - v->branches;
+      continue;
+    }
+    uint32_t i = 0;
+    while (i < count && best[i].branch != piece->owner) ++i;
+    if (i == count && count < KEPT)
+      best[count].branch = piece->owner, best[count++].distance = INFINITY;
+    if (i == KEPT) { // another branch that is nearer takes the farthest one's place
+      i = 0;
+      for (uint32_t j = 1; j < KEPT; ++j)
+        if (best[j].distance > best[i].distance) i = j;
+      if (d < best[i].distance) best[i].branch = piece->owner, best[i].distance = INFINITY;
+    }
+    if (d < best[i].distance && best[i].branch == piece->owner)
+      best[i].distance = d, best[i].at = piece->at, best[i].t = t;
+  }
+  uint32_t first = 0;
+  for (uint32_t i = 1; i < count; ++i)
+    if (best[i].distance < best[first].distance) first = i;
+  if (count == 0) return out;
+  out.lumen = best[first].distance, out.branch = best[first].branch, out.at = best[first].at,
+  out.t = best[first].t;
+  for (uint32_t i = 0; i < count; ++i)
+    if (i != first && best[i].distance < best[first].distance + SLACK_M)
+      out.lumen = fmin(out.lumen, rounded(v, p, best[first].branch, best[first].distance,
+                                          best[i].branch, best[i].distance));
+  return out;
+}
+
+double limb_vessels_lumen(const struct limb_vessels *v, sonde_vec3 p, uint32_t *branch, double *arc,
+                          double *wall) {
+  nearest n = find_nearest(v, p);
+  *branch = n.branch, *arc = 0, *wall = 0;
+  if (n.branch == VESSEL_NONE) return n.lumen;
+  const vessel_place *a = &v->place[n.at];
+  *arc = a->arc + n.t * (a[1].arc - a->arc);
+  *wall = a->wall + n.t * (a[1].wall - a->wall);
+  return n.lumen;
+}
+
+limb_vessel_hit limb_vessels_at(const struct limb_vessels *v, const double xyz[3]) {
+  SONDE_ASSERT(xyz);
+  limb_vessel_hit hit = {LIMB_PART_NONE, 0, INFINITY};
+  if (!v) return hit;
+  sonde_vec3 p = vec3(xyz[0], xyz[1], xyz[2]);
+  nearest n = find_nearest(v, p);
+  double wall = 0, sheath = 0;
+  if (n.branch != VESSEL_NONE) {
+    const vessel_place *a = &v->place[n.at];
+    wall = a->wall + n.t * (a[1].wall - a->wall);
+    const vessel_branch *b = &v->branch[n.branch];
+    bool deep = b->kind == SONDE_LIMB_ARTERY || b->kind == SONDE_LIMB_DEEP_VEIN;
+    sheath = deep ? wall + SHEATH_M : 0;
+    // The femoral sheath: a funnel that ends 35 mm below the ligament.
+    double down = (v->draws.ligament_z - p.z) / 0.035;
+    if (deep && down < 1 && a->radius > 0.003) sheath += 0.0015 * clamp(1 - down, 0, 1);
+  }
+  if (n.lumen <= 0) return (limb_vessel_hit){LIMB_PART_LUMEN, n.branch, n.lumen};
+  if (n.lumen <= wall) return (limb_vessel_hit){LIMB_PART_WALL, n.branch, n.lumen};
+  if (n.nerve <= 0) return (limb_vessel_hit){LIMB_PART_NERVE, n.which, n.nerve};
+  if (p.z > -0.12)
+    for (uint32_t k = 0; k < VESSEL_LYMPH; ++k) {
+      // Signed distance to an ellipsoid of revolution, exact to first order at its surface.
+      const limb_lymph *node = &v->lymph[k];
+      sonde_vec3 off = v_sub(p, node->centre);
+      double along = v_dot(off, node->axis), a = node->length, b = node->radius;
+      double across = sqrt(fmax(v_norm2(off) - along * along, 0)), h = hypot(along / a, across / b);
+      double slope = hypot(along / (a * a), across / (b * b)),
+             d = slope > 0 ? h * (h - 1) / slope : -b;
+      if (d <= 0) return (limb_vessel_hit){LIMB_PART_NODE, k, d};
+    }
+  if (n.lumen <= sheath) return (limb_vessel_hit){LIMB_PART_SHEATH, n.branch, n.lumen};
+  hit.index = n.branch;
+  hit.distance_m = fmin(n.lumen, n.nerve);
+  return hit;
+}
+
+double limb_vessels_bundle(const struct limb_vessels *v, const double xyz[3]) {
+  SONDE_ASSERT(xyz);
+  if (!v) return INFINITY;
+  nearest n = find_nearest(v, vec3(xyz[0], xyz[1], xyz[2]));
+  if (n.branch == VESSEL_NONE || v->branch[n.branch].kind >= SONDE_LIMB_PERFORATOR) return n.nerve;
+  return fmin(n.lumen - v->place[n.at].wall, n.nerve);
+}
