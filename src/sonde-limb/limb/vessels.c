@@ -166,6 +166,15 @@ sonde_status limb_vessels_make(sonde_limb *limb, sonde_error *error) {
   limb_vessels_lay_tributaries(v, great);
   limb_vessels_lay_small(v, great);
   limb_vessels_lay_muscle_veins(v);
+  // Where the fat is thin, a superficial vein is no wider than its layer.
+  for (uint32_t b = 0; b < v->branches; ++b)
+    for (uint32_t k = 8; k < v->branch[b].count && v->branch[b].layer != LAYER_DEEP; ++k) {
+      vessel_place *place = &v->place[v->branch[b].first + k];
+      double level, degrees, f;
+      limb_place_of(limb, limb_branch_point(v, b, k), &level, &degrees, &f);
+      double room = 0.5 * limb_fat(limb, level, degrees * DEGREE) - place->wall - 0.0006;
+      if (v->branch[b].layer != LAYER_ANY) place->radius = fmin(place->radius, fmax(room, 0.0003));
+    }
   status = limb_vessels_relax(v, 60, error);
   if (status) return status;
   limb_vessels_lay_perforators(v);

@@ -271,7 +271,7 @@ sonde_status limb_vessels_count_faults(struct limb_vessels *v, sonde_error *erro
     if (v->branch[b].layer == LAYER_DEEP)
       v->faults.fascia += height > range.high + FASCIA_M - 0.0003;
     if (v->branch[b].layer == LAYER_EYE)
-      v->faults.eye += height < range.low - 2e-4 || height > range.high + 3e-4;
+      v->faults.eye += height < range.low - 3e-4 || height > range.high + 5e-4;
   }
   end(&n);
   sonde_free(touching);
