@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { FAMILY = 100, POPULATION = 600 };
+enum { FAMILY = 40, POPULATION = 600 };
 
 // A limb without its muscles, which the vessels do not ask for.
 static sonde_limb *member(uint32_t k, sonde_limb_side side) {
@@ -47,6 +47,9 @@ static void places_keep_their_distances(void **state) {
     sonde_limb_vessel_faults f = sonde_limb_vessel_check(family[k]);
     sum.walls += f.walls, sum.bone += f.bone, sum.lumen += f.lumen;
     sum.fascia += f.fascia, sum.eye += f.eye;
+    if (f.bone + f.fascia > 3 || f.walls > 12)
+      print_message("member %u: walls %u, bone %u, lumen %u, fascia %u, eye %u\n", k, f.walls,
+                    f.bone, f.lumen, f.fascia, f.eye);
     places += family[k]->vessels->places;
   }
   print_message("of %u places: walls %u, bone %u, lumen in bone %u, fascia %u, eye %u\n", places,

@@ -40,7 +40,7 @@ static const station_row STATIONS[] = {
      SONDE_LIMB_SUPINE_TURNED,
      AT_LIGAMENT,
      -0.012,
-     NAN,
+     8,
      {"external iliac vein"}},
     {"common femoral vein",
      "V1",
@@ -49,7 +49,7 @@ static const station_row STATIONS[] = {
      SONDE_LIMB_SUPINE_TURNED,
      AT_BETWEEN,
      0,
-     NAN,
+     8,
      {"common femoral vein"}},
     {"saphenofemoral junction",
      "V2",
@@ -58,7 +58,7 @@ static const station_row STATIONS[] = {
      SONDE_LIMB_SUPINE_TURNED,
      AT_JUNCTION,
      0,
-     NAN,
+     8,
      {"common femoral vein", "great saphenous vein"}},
     {"deep femoral confluence",
      "V4",
@@ -67,7 +67,7 @@ static const station_row STATIONS[] = {
      SONDE_LIMB_SUPINE_TURNED,
      AT_CONFLUENCE,
      0.006,
-     NAN,
+     8,
      {"femoral vein", "deep femoral vein"}},
     {"femoral vein, proximal",
      "V5",
@@ -264,7 +264,10 @@ void sonde_limb_stations(const sonde_limb *limb, sonde_limb_station stations[SON
     sonde_limb_force_band(s->depth_m, s->force_n);
     // To the limb's own side; +x to the patient's left, on the medial and lateral side to the back.
     s->target_m.x *= side, s->skin_m.x *= side, s->normal.x *= side;
+    // The beam goes from the side asked for, or along the normal.
     sonde_vec3 down = v_neg(s->normal), wanted = vec3(1, -0.6, 0);
+    if (!isnan(row->toward))
+      down = vec3(-side * sin(row->toward * DEGREE), -cos(row->toward * DEGREE), 0);
     sonde_vec3 across = v_unit(v_cross(vec3(0, 0, 1), down), vec3(1, 0, 0));
     if (v_dot(across, wanted) < 0) across = v_neg(across);
     s->probe.position = s->skin_m;

@@ -56,19 +56,23 @@ static bool reserve(growing *g, void **array, uint32_t *room, uint32_t needed, s
 static void split(growing *g, uint32_t cell, const uint32_t *from, uint32_t count,
                   sonde_vec3 middle, double half, uint32_t depth) {
   struct limb_vessels *v = g->v;
-  double reach = half * sqrt(3.0), least = INFINITY, t;
+  double reach = half * sqrt(3.0), least = INFINITY, nearest_vessel = INFINITY, t;
   uint32_t *kept = SONDE_NEW(uint32_t, count);
   double *distance = SONDE_NEW(double, count);
   uint32_t n = 0;
   if (!kept || !distance) g->failed = true;
   for (uint32_t k = 0; k < count && !g->failed; ++k) {
-    distance[k] = piece_distance(&v->piece[from[k]], middle, &t);
-    if (distance[k] < least) least = distance[k];
+    const vessel_piece *piece = &v->piece[from[k]];
+    distance[k] = piece_distance(piece, middle, &t);
+    least = fmin(least, distance[k]);
+    if (piece->owner < v->branches) nearest_vessel = fmin(nearest_vessel, distance[k]);
   }
-  double slack = least - reach > SLACK_M ? 0 : SLACK_M; // joints are rounded near them only
+  // Nerves count where they are nearer than vessels; joints are rounded near them only.
   for (uint32_t k = 0; k < count && !g->failed; ++k) {
-    if (least - reach > FAR_M && n > 0) break;
-    if (least - reach > FAR_M ? distance[k] <= least : distance[k] < least + 2 * reach + slack)
+    bool vessel = v->piece[from[k]].owner < v->branches;
+    double slack = nearest_vessel - reach > SLACK_M ? 0 : SLACK_M;
+    double most = vessel ? nearest_vessel : least;
+    if (most - reach > FAR_M ? distance[k] <= most : distance[k] < most + 2 * reach + slack)
       kept[n++] = from[k];
   }
   sonde_free(distance);

@@ -67,7 +67,7 @@ static uint32_t main_artery(const struct limb_vessels *v, sonde_vec3 *knot) {
   knot[n++] = groin_point(limb, 19 * mm, d->bifurcation_z, cover + 1 * mm);
   const double femoral[][3] = {
       {0.15, 21, 0.79}, {0.25, 36, 0.71},  {0.35, 48, 0.69},  {0.45, 60, 0.67},  {0.52, 70, 0.67},
-      {0.60, 87, 0.64}, {0.66, 103, 0.53}, {0.72, 135, 0.41}, {0.80, 165, 0.42}, {0.90, 180, 0.50},
+      {0.60, 87, 0.64}, {0.66, 104, 0.49}, {0.72, 135, 0.41}, {0.80, 165, 0.42}, {0.90, 180, 0.50},
       {1.0, 186, 0.52}, {1.08, 182, 0.42}, {1.13, 172, 0.36}, {1.17, 155, 0.31}, {1.22, 135, 0.28}};
   double shift = d->hiatus - 0.72, turn = 3 * d->wander[0];
   for (size_t k = 0; k < SONDE_COUNT_OF(femoral); ++k) {

@@ -150,8 +150,9 @@ static void push_out(const neighbours *n, sonde_vec3 *step) {
     double keep = v->branch[b].layer == LAYER_EYE
                       ? 0.0008
                       : BONE_M; // at the malleolus bone is under the fascia
+    if (v->branch[b].layer == LAYER_OUTER) continue;
     double lack = size + keep - limb_bone_distance(v->limb, at, NULL);
-    if (lack <= 0 || v->branch[b].layer == LAYER_OUTER) continue;
+    if (lack <= 0) continue;
     sonde_vec3 grow = {0};
     const double h = 2e-4;
     for (int c = 0; c < 3; ++c) {
