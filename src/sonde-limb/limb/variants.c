@@ -59,11 +59,12 @@ static void draw_calibres(bool female, uint64_t seed, double *radius) {
   double z = 0;
   for (uint32_t k = 0; k < DRAW_TRIES; ++k) {
     z = 0.5 * arterial + sqrt(0.75) * limb_draw_normal(seed, DRAW_CALIBRES + DIA_COUNT + k);
-    mm[DIA_CFV] = diameter(female, DIA_CFV, 1.2 * z - 0.1);
+    mm[DIA_CFV] = diameter(female, DIA_CFV, (female ? 1.2 * z - 0.1 : 1.5 * z - 0.8));
     if (mm[DIA_CFV] > 1.0 * mm[DIA_CFA] && mm[DIA_CFV] < 1.6 * mm[DIA_CFA]) break;
     mm[DIA_CFV] = 1.2 * mm[DIA_CFA];
   }
-  mm[DIA_EIV] = fmax(diameter(female, DIA_EIV, 1.2 * z - 0.1), mm[DIA_CFV]);
+  mm[DIA_EIV] =
+      fmax(diameter(female, DIA_EIV, (female ? 1.2 * z - 0.1 : 1.5 * z - 0.8)), mm[DIA_CFV]);
   // Tributaries are narrower than what they join.
   const struct {
     vessel_diameter narrow, wide;
