@@ -180,7 +180,7 @@ typedef struct sonde_limb_station {
   double force_n[2];   /**< within which a healthy vein at this depth closes, supine */
 } sonde_limb_station;
 
-/** The stations of a limb from groin to ankle. @param[out] SONDE_LIMB_STATIONS. @thread any */
+/** The stations of a limb from groin to ankle. @thread any */
 SONDE_API void sonde_limb_stations(const sonde_limb *limb,
                                    sonde_limb_station stations[SONDE_LIMB_STATIONS]);
 /** Forces between which a healthy deep vein at a depth closes under a 40 x 8 to 50 x 12 mm face, N.
