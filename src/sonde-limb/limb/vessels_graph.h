@@ -25,21 +25,35 @@ enum {
 // ---- what is drawn ------------------------------------------------------------------------------
 
 // Mean diameters of men and women and their deviation, mm (docs/limb_vessels.md), supine.
-#define VESSEL_DIAMETERS(X)                                                                        \
-  X(DIA_EIV, 11.5, 10.5, 1.8)                                                                      \
-  X(DIA_CFV, 11.2, 9.9, 1.8)                                                                       \
-  X(DIA_FV, 6.85, 6.35, 1.3)                                                                       \
-  X(DIA_DFV, 6.5, 6.0, 1.3)                                                                        \
-  X(DIA_POPV, 7.7, 7.7, 1.5)                                                                       \
-  X(DIA_TPV, 6, 6, 1.2)                                                                            \
-  X(DIA_PTV, 2.7, 2.7, 0.7)                                                                        \
-  X(DIA_PERV, 3.2, 3.2, 0.9)                                                                       \
-  X(DIA_ATV, 1.8, 1.8, 0.5) X(DIA_GSV_ARCH, 6.0, 6.0, 1.4) X(DIA_GSV, 3.0, 3.0, 0.7)               \
-      X(DIA_GSV_CALF, 2.0, 2.0, 0.5) X(DIA_SSV, 3.0, 3.0, 0.8) X(DIA_GASTROCNEMIUS, 3.5, 3.5, 0.9) \
-          X(DIA_SOLEAL, 5, 5, 1) X(DIA_PERFORATOR, 1.3, 1.3, 0.56) X(DIA_EIA, 8.6, 7.4, 1)         \
-              X(DIA_CFA, 10, 7.8, 0.9) X(DIA_SFA, 7, 6, 0.8) X(DIA_SFA_END, 6.2, 5.3, 0.8)         \
-                  X(DIA_DFA, 6, 5, 0.8) X(DIA_POPA, 7.2, 6.1, 0.8) X(DIA_TPA, 4.5, 3.9, 0.6)       \
-                      X(DIA_ATA, 3, 3, 0.5) X(DIA_PTA, 2.8, 2.8, 0.5) X(DIA_PERA, 2.8, 2.8, 0.5)
+// clang-format off
+#define VESSEL_DIAMETERS(X) \
+  X(DIA_EIV, 11.5, 10.5, 1.8) \
+  X(DIA_CFV, 11.2, 9.9, 1.8) \
+  X(DIA_FV, 6.85, 6.35, 1.3) \
+  X(DIA_DFV, 6.5, 6.0, 1.3) \
+  X(DIA_POPV, 7.7, 7.7, 1.5) \
+  X(DIA_TPV, 6, 6, 1.2) \
+  X(DIA_PTV, 2.7, 2.7, 0.7) \
+  X(DIA_PERV, 3.2, 3.2, 0.9) \
+  X(DIA_ATV, 1.8, 1.8, 0.5) \
+  X(DIA_GSV_ARCH, 6.0, 6.0, 1.4) \
+  X(DIA_GSV, 3.0, 3.0, 0.7) \
+  X(DIA_GSV_CALF, 2.0, 2.0, 0.5) \
+  X(DIA_SSV, 3.0, 3.0, 0.8) \
+  X(DIA_GASTROCNEMIUS, 3.5, 3.5, 0.9) \
+  X(DIA_SOLEAL, 5, 5, 1) \
+  X(DIA_PERFORATOR, 1.3, 1.3, 0.56) \
+  X(DIA_EIA, 8.6, 7.4, 1) \
+  X(DIA_CFA, 10, 7.8, 0.9) \
+  X(DIA_SFA, 7, 6, 0.8) \
+  X(DIA_SFA_END, 6.2, 5.3, 0.8) \
+  X(DIA_DFA, 6, 5, 0.8) \
+  X(DIA_POPA, 7.2, 6.1, 0.8) \
+  X(DIA_TPA, 4.5, 3.9, 0.6) \
+  X(DIA_ATA, 3, 3, 0.5) \
+  X(DIA_PTA, 2.8, 2.8, 0.5) \
+  X(DIA_PERA, 2.8, 2.8, 0.5)
+// clang-format on
 typedef enum vessel_diameter {
 #define ROW(name, male, female, deviation) name,
   VESSEL_DIAMETERS(ROW)
