@@ -180,7 +180,7 @@ static void measure_cells(const struct limb_muscles *m, uint32_t row, const sect
     }
     for (uint32_t k = 0; k < LIMB_SEEDS; ++k)
       nearer[k] = d[k] - d1 < nearer[k] ? d[k] - d1 : nearer[k];
-    double apart = hypot(x[first] - x[second], y[first] - y[second]) + 1e-6;
+    double apart = hypot((double)(x[first] - x[second]), (double)(y[first] - y[second])) + 1e-6;
     double part = fmin(1, 0.5 + 0.5 * (d2 - d1) / apart / s->spacing);
     area[m->cell_of[first]] += part * s->cell_area;
     area[m->cell_of[second]] += (1 - part) * s->cell_area;

@@ -42,15 +42,15 @@ typedef struct sonde_elastic {
 
 // Pattern and analysis. @return ARGUMENT for a mesh of which nothing is held, and bad nodes
 // @thread owner
-SONDE_LINK sonde_status sonde_elastic_create(const sonde_elastic_def *def, sonde_elastic **elastic,
-                                             sonde_error *error);
+sonde_status sonde_elastic_create(const sonde_elastic_def *def, sonde_elastic **elastic,
+                                  sonde_error *error);
 SONDE_LINK void sonde_elastic_destroy(sonde_elastic *elastic);
 
 // New moduli: Young's of each tetrahedron and one Poisson ratio, 0 <= poisson < 0.5. skin_n_m is
 // the shear modulus times the thickness of a membrane on the outer faces, 0: none. Assembles and
 // factors. @return ARGUMENT; CONVERGENCE: the matrix is not positive definite @thread owner
-SONDE_LINK sonde_status sonde_elastic_set(sonde_elastic *elastic, const double *young_pa,
-                                          double poisson, double skin_n_m, sonde_error *error);
+sonde_status sonde_elastic_set(sonde_elastic *elastic, const double *young_pa, double poisson,
+                               double skin_n_m, sonde_error *error);
 // f[3 count] = K u. @thread any (read only)
 void sonde_elastic_multiply(const sonde_elastic *elastic, const double *u, double *f);
 
