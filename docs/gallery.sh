@@ -21,7 +21,7 @@ shoot() {
 for state in healthy acute:acute_occlusive chronic:chronic_occlusive; do
   set -- "$model" --site 27 --depth-mm 50 --case "${state#*:}"
   shoot "${state%:*}_rest" "$@" --force-n 0.5
-  shoot "${state%:*}_pressed" "$@" --force-n 12
+  shoot "${state%:*}_pressed" "$@" --force-n 7
 done
 shoot healthy_along "$model" --site 27 --depth-mm 50 --turn-deg 90 --force-n 2
 shoot healthy_curved "$model" --site 27 --curved-mm 60 --aperture-mm 60 --frequency-mhz 4 \
@@ -30,9 +30,9 @@ shoot healthy_curved "$model" --site 27 --curved-mm 60 --aperture-mm 60 --freque
 "$sonde" generate --seed 3 --sex female --fat-mm 26 -o "$models/fat"
 "$sonde" generate --seed 3 --sex male --fat-mm 5 -o "$models/lean"
 shoot fat_rest "$models/fat" --site 12 --depth-mm 70
-shoot fat_pressed "$models/fat" --site 12 --depth-mm 70 --force-n 14
+shoot fat_pressed "$models/fat" --site 12 --depth-mm 70 --force-n 16
 shoot lean_rest "$models/lean" --site 12 --depth-mm 50
-shoot lean_pressed "$models/lean" --site 12 --depth-mm 50 --force-n 14
+shoot lean_pressed "$models/lean" --site 12 --depth-mm 50 --force-n 6
 
 "$sonde" generate --seed 7 --second-vein 1 -o "$models/more"
 set -- "$models/more" --site 12 --depth-mm 50
@@ -40,8 +40,12 @@ shoot node "$@" --lesion node:5:12:13:8
 shoot cyst "$@" --lesion cyst:8:30:16:10
 shoot haematoma "$@" --lesion haematoma:-8:32:18:12
 shoot saphenous_rest "$@" --clot great_saphenous:acute
-shoot saphenous_pressed "$@" --clot great_saphenous:acute --force-n 8
+shoot saphenous_pressed "$@" --clot great_saphenous:acute --force-n 5
 shoot oedema "$@" --oedema 0.8
 set -- "$models/more" --site 22 --depth-mm 50 --case chronic --webs 1
 shoot webs "$@"
-shoot webs_pressed "$@" --force-n 14
+shoot webs_pressed "$@" --force-n 8
+
+# Sections of a whole limb.
+"$sonde" limb --seed 3 --levels 0.15,0.5,1.5 --atlas "$models/limb" >"$models/table"
+for level in 0.15 0.50 1.50; do cp "$models/limb/section_+$level.svg" "$out/limb_$level.svg"; done
