@@ -4,6 +4,7 @@
 
 #include "limb/frame.h"
 #include "limb/muscles.h"
+#include "limb/vessels.h"
 
 enum { FAMILY = 50 };
 
@@ -33,7 +34,8 @@ static void cells_have_their_areas_and_cover_the_section(void **state) {
           // Nothing within the fascia is without a label, and no skin is there.
           assert_true(label.tissue >= SONDE_LIMB_FAT);
           const double xyz[3] = {p.x, p.y, p.z};
-          if (label.tissue >= SONDE_LIMB_SHEATH || limb_bone_distance(limb, xyz, NULL) < 0) {
+          bool bundle = limb->vessels && limb_vessels_bundle(limb->vessels, xyz) < 0;
+          if (bundle || limb_bone_distance(limb, xyz, NULL) < 0) {
             other += step * step;
             continue;
           }

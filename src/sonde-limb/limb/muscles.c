@@ -145,7 +145,7 @@ static void sample_section(const sonde_limb *limb, double level, double radius, 
       if (r > limb_fascia_radius(limb, level, atan2(x, y))) continue;
       const double p[3] = {c.x + radius * x, c.y + radius * y, c.z};
       if (limb_bone_distance(limb, p, NULL) < 0) continue;
-      if (limb->vessels && limb_vessels_at(limb->vessels, p).part != LIMB_PART_NONE) continue;
+      if (limb->vessels && limb_vessels_bundle(limb->vessels, p) < 0) continue;
       SONDE_ASSERT(s->count < SAMPLES);
       s->x[s->count] = (float)x, s->y[s->count++] = (float)y;
     }
