@@ -38,10 +38,6 @@ typedef struct work {
   char drawn[64]; // what the scan does not show
 } work;
 
-static double *member(sonde_thigh *thigh, const sonde_thigh_parameter *p) {
-  return (double *)(void *)((char *)thigh + p->offset);
-}
-
 static const char *const SEXES[] = {"female", "male", NULL};
 static const char *const SIDES[] = {"right", "left", NULL};
 static const char *const AXES[] = {"ras", "lps", NULL};
@@ -78,19 +74,8 @@ static const app_option TABLE[] = {
 // The parameters of a thigh, as the library lists them.
 static uint32_t list_parameters(app_option *list, uint32_t room) {
   uint32_t count;
-  const sonde_thigh_parameter *p = sonde_thigh_parameters(&count);
-  if (count > room) count = room;
-  for (uint32_t k = 0; k < count; ++k)
-    list[k] = (app_option){.name = p[k].name,
-                           .value = "X",
-                           .kind = OPTION_REAL,
-                           .at = offsetof(options, known) + p[k].offset,
-                           .bytes = sizeof(double),
-                           .low = p[k].low / p[k].unit,
-                           .high = p[k].high / p[k].unit,
-                           .scale = p[k].unit,
-                           .help = p[k].text};
-  return count;
+  const sonde_parameter *p = sonde_thigh_parameters(&count);
+  return app_list_parameters(list, room, p, count, offsetof(options, known));
 }
 
 static int check(void *from) {
@@ -119,13 +104,13 @@ static void print(const options *a, work *w) {
   sonde_mesh_report mesh = {0};
   (void)sonde_mesh_inspect(&w->model->surface, &mesh, NULL);
   uint32_t count;
-  const sonde_thigh_parameter *p = sonde_thigh_parameters(&count);
+  const sonde_parameter *p = sonde_thigh_parameters(&count);
   if (a->json) {
     app_json_begin();
     app_json("seed:%ld sex:%s", a->seed, w->thigh.sex == SONDE_SEX_FEMALE ? "female" : "male");
     app_json_object("parameters");
     for (uint32_t k = 0; k < count; ++k)
-      app_json_real(p[k].name, *member(&w->thigh, &p[k]) / p[k].unit);
+      app_json_real(p[k].name, *sonde_parameter_of(&w->thigh, &p[k]) / p[k].unit);
     app_json_close();
     app_json("nodes:%u closed:%hhd smallest_angle_deg:%g volume_l:%g",
              w->model->surface.vertex_count, mesh.closed,
@@ -154,7 +139,8 @@ static void print(const options *a, work *w) {
   }
   printf("seed %ld, %s\n", a->seed, w->thigh.sex == SONDE_SEX_FEMALE ? "female" : "male");
   for (uint32_t k = 0; k < count; ++k)
-    printf("%-18s %8.2f  %s\n", p[k].name, *member(&w->thigh, &p[k]) / p[k].unit, p[k].text);
+    printf("%-18s %8.2f  %s\n", p[k].name, *sonde_parameter_of(&w->thigh, &p[k]) / p[k].unit,
+           p[k].text);
   printf("%u nodes, %.2f l, smallest angle %.1f degrees\n", w->model->surface.vertex_count,
          mesh.volume_m3 * 1e3, mesh.smallest_angle_rad * 57.29577951308232);
   if (w->leg.missed)

@@ -37,19 +37,8 @@ static const app_option TABLE[] = {
 // The parameters of a body, as the library lists them.
 static uint32_t list_parameters(app_option *list, uint32_t room) {
   uint32_t count;
-  const sonde_limb_parameter *p = sonde_limb_parameters(&count);
-  if (count > room) count = room;
-  for (uint32_t k = 0; k < count; ++k)
-    list[k] = (app_option){.name = p[k].name,
-                           .value = "X",
-                           .kind = OPTION_REAL,
-                           .at = offsetof(options, known) + p[k].offset,
-                           .bytes = sizeof(double),
-                           .low = p[k].low / p[k].unit,
-                           .high = p[k].high / p[k].unit,
-                           .scale = p[k].unit,
-                           .help = p[k].text};
-  return count;
+  const sonde_parameter *p = sonde_limb_parameters(&count);
+  return app_list_parameters(list, room, p, count, offsetof(options, known));
 }
 
 enum { MOST_LEVELS = 40 };
@@ -91,16 +80,15 @@ static int check(void *from) {
 static const double GIRTHS[] = {0.12, 0.25, 0.5, 0.75, 0.88, 1, 1.15, 1.28, 1.5, 1.75, 1.86};
 
 static void print_json(const options *a, const sonde_limb *limb) {
-  const sonde_limb_body *body = sonde_limb_body_of(limb);
+  sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
-  const sonde_limb_parameter *p = sonde_limb_parameters(&count);
+  const sonde_parameter *p = sonde_limb_parameters(&count);
   app_json_begin();
-  app_json("seed:%ld sex:%s side:%s", a->seed, body->sex == SONDE_SEX_FEMALE ? "female" : "male",
-           body->side == SONDE_LIMB_LEFT ? "left" : "right");
+  app_json("seed:%ld sex:%s side:%s", a->seed, body.sex == SONDE_SEX_FEMALE ? "female" : "male",
+           body.side == SONDE_LIMB_LEFT ? "left" : "right");
   app_json_object("parameters");
   for (uint32_t k = 0; k < count; ++k) {
-    const double *value = (const double *)(const void *)((const char *)body + p[k].offset);
-    app_json_real(p[k].name, *value / p[k].unit);
+    app_json_real(p[k].name, *sonde_parameter_of(&body, &p[k]) / p[k].unit);
   }
   app_json_close();
   app_json_array("girths");
@@ -128,14 +116,14 @@ static void print_json(const options *a, const sonde_limb *limb) {
 }
 
 static void print_text(const options *a, const sonde_limb *limb) {
-  const sonde_limb_body *body = sonde_limb_body_of(limb);
+  sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
-  const sonde_limb_parameter *p = sonde_limb_parameters(&count);
-  printf("seed %ld, %s, %s\n", a->seed, body->sex == SONDE_SEX_FEMALE ? "female" : "male",
-         body->side == SONDE_LIMB_LEFT ? "left" : "right");
+  const sonde_parameter *p = sonde_limb_parameters(&count);
+  printf("seed %ld, %s, %s\n", a->seed, body.sex == SONDE_SEX_FEMALE ? "female" : "male",
+         body.side == SONDE_LIMB_LEFT ? "left" : "right");
   for (uint32_t k = 0; k < count; ++k) {
-    const double *value = (const double *)(const void *)((const char *)body + p[k].offset);
-    printf("%-20s %8.2f  %s\n", p[k].name, *value / p[k].unit, p[k].text);
+    printf("%-20s %8.2f  %s\n", p[k].name, *sonde_parameter_of(&body, &p[k]) / p[k].unit,
+           p[k].text);
   }
   printf("\nlevel   girth mm\n");
   for (size_t k = 0; k < sizeof GIRTHS / sizeof *GIRTHS; ++k)

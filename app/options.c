@@ -317,6 +317,23 @@ int app_options_read(const app_command *command, int argc, char **argv, void *op
   return code == APP_OK ? -1 : code;
 }
 
+uint32_t app_list_parameters(app_option *list, uint32_t room, const sonde_parameter *p,
+                             uint32_t count, size_t at) {
+  assert(list && p);
+  if (count > room) count = room;
+  for (uint32_t k = 0; k < count; ++k)
+    list[k] = (app_option){.name = p[k].name,
+                           .value = "X",
+                           .kind = OPTION_REAL,
+                           .at = at + p[k].offset,
+                           .bytes = sizeof(double),
+                           .low = p[k].low / p[k].unit,
+                           .high = p[k].high / p[k].unit,
+                           .scale = p[k].unit,
+                           .help = p[k].text};
+  return count;
+}
+
 bool app_option_given(const char *name) { return given_name(name, strlen(name)); }
 
 void app_command_line(char *text, size_t room) {

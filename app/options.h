@@ -90,6 +90,10 @@ extern const app_command cmd_run, cmd_fit, cmd_generate, cmd_limb, cmd_predict, 
     cmd_identify, cmd_press, cmd_image, cmd_cut, cmd_simulate, cmd_reconstruct, cmd_slice,
     cmd_replay, cmd_bench, cmd_exam, cmd_class, cmd_cases, cmd_validate, cmd_paper, cmd_devices;
 
+// Options for the parameters of a struct that stands at `at` in the command's options: what a
+// command's `extend` returns. The first `room` of `count` are written.
+uint32_t app_list_parameters(app_option *list, uint32_t room, const sonde_parameter *p,
+                             uint32_t count, size_t at);
 // Reads the words behind the verb. -1: go on; else the exit code, after help or after what is
 // wrong.
 int app_options_read(const app_command *command, int argc, char **argv, void *options);

@@ -54,17 +54,8 @@ typedef struct sonde_thigh {
 #undef SONDE_THIGH_MEMBER
 } sonde_thigh;
 
-/** One row of SONDE_THIGH_LIST. */
-typedef struct sonde_thigh_parameter {
-  const char *name; /**< as on the command line, with the unit */
-  const char *text;
-  double unit; /**< SI per unit */
-  double low, high;
-  size_t offset; /**< of the member */
-} sonde_thigh_parameter;
-
 /** The parameters in the order of SONDE_THIGH_LIST. @thread any */
-SONDE_API const sonde_thigh_parameter *sonde_thigh_parameters(uint32_t *count);
+SONDE_API const sonde_parameter *sonde_thigh_parameters(uint32_t *count);
 /** A thigh of which everything is to be drawn. @thread any */
 SONDE_API sonde_thigh sonde_thigh_unknown(void);
 

@@ -192,6 +192,18 @@ SONDE_API sonde_status sonde_directory_make(const char *path, unsigned mode, boo
  *  @thread any */
 SONDE_API sonde_status sonde_file_load(const char *path, char **bytes, size_t *count,
                                        sonde_error *error);
+/** A number of a struct that a user may give by its name: a list of these describes the struct. */
+typedef struct sonde_parameter {
+  const char *name; /**< as on the command line, with the unit */
+  const char *text; /**< what it means */
+  double unit;      /**< SI per unit */
+  double low, high; /**< least and largest value, SI */
+  size_t offset;    /**< of the member, a double */
+} sonde_parameter;
+
+/** The member of a struct that the parameter describes. @param of borrowed @thread any */
+SONDE_API double *sonde_parameter_of(void *of, const sonde_parameter *parameter);
+
 /** Releases memory handed out by the library; NULL is ignored. @thread any */
 SONDE_API void sonde_free(void *pointer);
 

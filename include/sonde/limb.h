@@ -75,17 +75,8 @@ typedef struct sonde_limb_body {
   double share[SONDE_LIMB_MUSCLES]; /**< volume of each muscle against the rule; NaN: drawn */
 } sonde_limb_body;
 
-/** One row of SONDE_LIMB_LIST. */
-typedef struct sonde_limb_parameter {
-  const char *name; /**< as on the command line, with the unit */
-  const char *text;
-  double unit; /**< SI per unit */
-  double low, high;
-  size_t offset; /**< of the member */
-} sonde_limb_parameter;
-
 /** The parameters in the order of SONDE_LIMB_LIST. @thread any */
-SONDE_API const sonde_limb_parameter *sonde_limb_parameters(uint32_t *count);
+SONDE_API const sonde_parameter *sonde_limb_parameters(uint32_t *count);
 /** A right limb of which everything is to be drawn. @thread any */
 SONDE_API sonde_limb_body sonde_limb_unknown(void);
 

@@ -9,21 +9,17 @@
 enum { SEEDS = ROUNDS(20, 5) };
 static const double DEGREE = SONDE_PI / 180;
 
-static double *member(sonde_thigh *thigh, const sonde_thigh_parameter *p) {
-  return (double *)(void *)((char *)thigh + p->offset);
-}
-
 /* ---- parameters --------------------------------------------------------------------------- */
 
 static void wrong_parameters_are_named(void **state) {
   (void)state;
   uint32_t count;
-  const sonde_thigh_parameter *p = sonde_thigh_parameters(&count);
+  const sonde_parameter *p = sonde_thigh_parameters(&count);
   for (uint32_t k = 0; k < count; ++k)
     for (int side = 0; side < 2; ++side) {
       sonde_thigh known = sonde_thigh_unknown(), thigh;
       double span = p[k].high - p[k].low;
-      *member(&known, &p[k]) = side ? p[k].high + 0.1 * span : p[k].low - 0.1 * span;
+      *sonde_parameter_of(&known, &p[k]) = side ? p[k].high + 0.1 * span : p[k].low - 0.1 * span;
       sonde_error error = {0};
       assert_int_equal(sonde_thigh_draw(&known, 1, &thigh, &error), SONDE_ARGUMENT);
       char range[64];

@@ -1,54 +1,42 @@
 // The parameters of a thigh: their list, their ranges and their distributions (docs/anatomy.md).
 #include "anatomy/shape.h"
+#include "base/parameters.h"
 #include "base/random.h"
 
 #include <stddef.h>
 
 #define ROW(member, name, unit, low, high, text)                                                   \
   {name, text, unit, low, high, offsetof(sonde_thigh, member)},
-static const sonde_thigh_parameter PARAMETERS[] = {SONDE_THIGH_LIST(ROW)};
+static const sonde_parameter PARAMETERS[] = {SONDE_THIGH_LIST(ROW)};
 #undef ROW
 
 enum { TRIES = 64, SEX_COUNTER = 1 << 20 };
 
-const sonde_thigh_parameter *sonde_thigh_parameters(uint32_t *count) {
+const sonde_parameter *sonde_thigh_parameters(uint32_t *count) {
   SONDE_ASSERT(count);
   *count = (uint32_t)SONDE_COUNT_OF(PARAMETERS);
   return PARAMETERS;
 }
 
-static double *value_of(sonde_thigh *thigh, const sonde_thigh_parameter *p) {
-  SONDE_ASSERT(p->offset + sizeof(double) <= sizeof *thigh);
-  return (double *)(void *)((char *)thigh + p->offset);
-}
-
 sonde_thigh sonde_thigh_unknown(void) {
   sonde_thigh thigh = {.sex = SONDE_SEX_DRAWN};
-  for (size_t k = 0; k < SONDE_COUNT_OF(PARAMETERS); ++k) *value_of(&thigh, &PARAMETERS[k]) = NAN;
+  sonde_parameters_forget(&thigh, PARAMETERS, SONDE_COUNT_OF(PARAMETERS));
   return thigh;
 }
 
-static sonde_status check_one(const sonde_thigh_parameter *p, double value, sonde_error *error) {
-  const double slack = 1e-9; // 30 degrees or 3 mm may be a last bit beyond
-  if (value >= p->low - slack && value <= p->high + slack) return SONDE_OK;
-  return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g (%s)", p->name,
-                    value / p->unit, p->low / p->unit, p->high / p->unit, p->text);
-}
-
 sonde_status sonde_thigh_check(const sonde_thigh *thigh, sonde_error *error) {
-  sonde_thigh copy = *thigh;
-  for (size_t k = 0; k < SONDE_COUNT_OF(PARAMETERS); ++k) {
-    sonde_status status = check_one(&PARAMETERS[k], *value_of(&copy, &PARAMETERS[k]), error);
-    if (status) return status;
-  }
-  if (copy.second_vein != 0 && copy.second_vein != 1)
+  sonde_status status =
+      sonde_parameters_check(thigh, PARAMETERS, SONDE_COUNT_OF(PARAMETERS), true, error);
+  if (status) return status;
+  if (thigh->second_vein != 0 && thigh->second_vein != 1)
     return sonde_fail(error, SONDE_ARGUMENT, "second-vein is %g, expected 0 or 1",
-                      copy.second_vein);
-  if (!(copy.girth_proximal_m >= copy.girth_m && copy.girth_m >= copy.girth_distal_m))
+                      thigh->second_vein);
+  if (!(thigh->girth_proximal_m >= thigh->girth_m && thigh->girth_m >= thigh->girth_distal_m))
     return sonde_fail(error, SONDE_ARGUMENT,
                       "girth-mm is %g, expected %g to %g: between girth-distal-mm and "
                       "girth-proximal-mm",
-                      copy.girth_m * 1e3, copy.girth_distal_m * 1e3, copy.girth_proximal_m * 1e3);
+                      thigh->girth_m * 1e3, thigh->girth_distal_m * 1e3,
+                      thigh->girth_proximal_m * 1e3);
   return SONDE_OK;
 }
 
@@ -76,11 +64,9 @@ static void normal_draw(const draw *d, double *member, double mean, double devia
 sonde_status sonde_thigh_draw(const sonde_thigh *known, uint64_t seed, sonde_thigh *thigh,
                               sonde_error *error) {
   *thigh = *known;
-  for (size_t k = 0; k < SONDE_COUNT_OF(PARAMETERS); ++k) {
-    double value = *value_of(thigh, &PARAMETERS[k]);
-    sonde_status status = isnan(value) ? SONDE_OK : check_one(&PARAMETERS[k], value, error);
-    if (status) return status;
-  }
+  sonde_status status =
+      sonde_parameters_check(thigh, PARAMETERS, SONDE_COUNT_OF(PARAMETERS), false, error);
+  if (status) return status;
   if (thigh->sex == SONDE_SEX_DRAWN)
     thigh->sex = sonde_random_bits(seed, SEX_COUNTER) & 1 ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
   draw d = {thigh, seed};

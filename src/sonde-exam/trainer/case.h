@@ -9,8 +9,6 @@ extern const char *const sonde_case_postures[]; // likewise
 extern const char *const sonde_case_lesions[];
 extern const char *const sonde_case_sexes[];
 
-// The parameter of a thigh as a double.
-double *sonde_thigh_member(sonde_thigh *thigh, const sonde_thigh_parameter *parameter);
 // Everything that needs no model; a sentence without place.
 sonde_status sonde_case_check(const sonde_case *of, sonde_error *error);
 

@@ -33,10 +33,6 @@ bool sonde_decision_parse(const char *name, sonde_decision *decision) {
   return false;
 }
 
-double *sonde_thigh_member(sonde_thigh *thigh, const sonde_thigh_parameter *parameter) {
-  return (double *)(void *)((char *)thigh + parameter->offset);
-}
-
 sonde_case sonde_case_default(void) {
   sonde_case c = {.known = sonde_thigh_unknown(),
                   .circulation = sonde_circulation_default(),
@@ -69,7 +65,7 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   }
   const char *keys[KEYS] = {"seed", "sex"};
   uint32_t count;
-  const sonde_thigh_parameter *parameter = sonde_thigh_parameters(&count);
+  const sonde_parameter *parameter = sonde_thigh_parameters(&count);
   SONDE_ASSERT(count + 3 <= KEYS);
   for (uint32_t i = 0; i < count; ++i) keys[2 + i] = parameter[i].name;
   sonde_read_keys(reader, at, "thigh", keys);
@@ -77,11 +73,11 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   c->seed = sonde_read_integer(reader, at, "seed", 0, UINT32_MAX, 1);
   c->known.sex = (sonde_sex)sonde_read_choice(reader, at, "sex", sonde_case_sexes, 0);
   for (uint32_t i = 0; i < count; ++i) {
-    const sonde_thigh_parameter *p = &parameter[i];
+    const sonde_parameter *p = &parameter[i];
     if (!sonde_read_find(reader, at, p->name)) continue;
     double value =
         sonde_read_real(reader, at, p->name, p->low / p->unit, p->high / p->unit, UNKNOWN);
-    *sonde_thigh_member(&c->known, p) = value * p->unit;
+    *sonde_parameter_of(&c->known, p) = value * p->unit;
   }
 }
 

@@ -52,10 +52,10 @@ static void put_case(sonde_file *file, const sonde_case *c) {
     sonde_file_printf(file, "thigh:\n  seed: %llu\n  sex: %s\n", (unsigned long long)c->seed,
                       sonde_case_sexes[c->known.sex]);
     uint32_t count;
-    const sonde_thigh_parameter *p = sonde_thigh_parameters(&count);
+    const sonde_parameter *p = sonde_thigh_parameters(&count);
     sonde_thigh known = c->known;
     for (uint32_t i = 0; i < count; ++i) {
-      double value = *sonde_thigh_member(&known, &p[i]);
+      double value = *sonde_parameter_of(&known, &p[i]);
       if (isfinite(value)) sonde_file_printf(file, "  %s: %.12g\n", p[i].name, value / p[i].unit);
     }
   }

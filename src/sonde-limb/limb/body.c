@@ -1,38 +1,27 @@
 // The parameters of a body: their list, their ranges and the population's rules (docs/limb.md).
 #include "limb/frame.h"
 
+#include "base/parameters.h"
 #include "base/random.h"
 
 #define ROW(member, name, unit, low, high, text)                                                   \
   {name, text, unit, low, high, offsetof(sonde_limb_body, member)},
-static const sonde_limb_parameter PARAMETERS[] = {SONDE_LIMB_LIST(ROW)};
+static const sonde_parameter PARAMETERS[] = {SONDE_LIMB_LIST(ROW)};
 #undef ROW
 
 enum { TRIES = 64, SEX_COUNTER = 1 << 20 };
 
-const sonde_limb_parameter *sonde_limb_parameters(uint32_t *count) {
+const sonde_parameter *sonde_limb_parameters(uint32_t *count) {
   SONDE_ASSERT(count);
   *count = (uint32_t)SONDE_COUNT_OF(PARAMETERS);
   return PARAMETERS;
 }
 
-static double *value_of(sonde_limb_body *body, const sonde_limb_parameter *p) {
-  SONDE_ASSERT(p->offset + sizeof(double) <= sizeof *body);
-  return (double *)(void *)((char *)body + p->offset);
-}
-
 sonde_limb_body sonde_limb_unknown(void) {
   sonde_limb_body body = {.sex = SONDE_SEX_DRAWN, .side = SONDE_LIMB_RIGHT};
-  for (size_t k = 0; k < SONDE_COUNT_OF(PARAMETERS); ++k) *value_of(&body, &PARAMETERS[k]) = NAN;
+  sonde_parameters_forget(&body, PARAMETERS, SONDE_COUNT_OF(PARAMETERS));
   for (size_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) body.share[k] = NAN;
   return body;
-}
-
-static sonde_status check_range(const sonde_limb_parameter *p, double value, sonde_error *error) {
-  const double slack = 1e-9; // 30 degrees or 3 mm may be a last bit beyond
-  if (value >= p->low - slack && value <= p->high + slack) return SONDE_OK;
-  return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g (%s)", p->name,
-                    value / p->unit, p->low / p->unit, p->high / p->unit, p->text);
 }
 
 typedef struct draw {
@@ -154,11 +143,9 @@ sonde_status sonde_limb_draw(const sonde_limb_body *known, uint64_t seed, sonde_
                              sonde_error *error) {
   SONDE_ASSERT(known && body);
   sonde_limb_body drawn = *known;
-  for (size_t k = 0; k < SONDE_COUNT_OF(PARAMETERS); ++k) {
-    double value = *value_of(&drawn, &PARAMETERS[k]);
-    sonde_status status = isnan(value) ? SONDE_OK : check_range(&PARAMETERS[k], value, error);
-    if (status) return status;
-  }
+  sonde_status status =
+      sonde_parameters_check(&drawn, PARAMETERS, SONDE_COUNT_OF(PARAMETERS), false, error);
+  if (status) return status;
   drawn.seed = seed;
   if (drawn.sex == SONDE_SEX_DRAWN)
     drawn.sex = sonde_random_bits(seed, SEX_COUNTER) & 1 ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
