@@ -128,9 +128,9 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
   sonde_pathology held[2] = {*all, *all};
   held[0].thrombus_fraction = 0;
   double scale[2][2], blend = 1;
+  const double filled = artery ? sonde_artery_rest_scale(all) : 1;
   for (int fat = 0; fat < 2; ++fat) {
-    scale[0][fat] =
-        artery ? sonde_artery_rest_scale(all) : sonde_vein_rest_scale(&held[0], false, fat);
+    scale[0][fat] = artery ? filled : sonde_vein_rest_scale(&held[0], false, fat);
     scale[1][fat] = artery || !(all->thrombus_fraction > 0) ? scale[0][fat]
                                                             : sonde_vein_rest_scale(all, true, fat);
   }
