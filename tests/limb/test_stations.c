@@ -1,28 +1,12 @@
 // Stations of limbs over seeds, sexes and body mass indices: probes that see their vein, the views'
 // order of depth, bands of force, protocols.
-#include "../fixture.h"
-
-#include "limb/bones.h"
-#include "limb/vessels_graph.h"
+#include "bare_limb.h"
 
 #include <string.h>
 
 enum { FAMILY = 40 };
 
-static sonde_limb *member(uint32_t k, sonde_limb_side side) {
-  sonde_limb_body body = sonde_limb_unknown();
-  sonde_limb *limb = SONDE_NEW(sonde_limb, 1);
-  sonde_error error = {0};
-  body.sex = k % 2 ? SONDE_SEX_MALE : SONDE_SEX_FEMALE;
-  body.bmi = 17 + (k * 7) % 24, body.side = side;
-  sonde_status status = sonde_limb_draw(&body, 3000 + k, &body, &error);
-  limb->body = body, limb->scale = body.thigh_length_m / 0.430;
-  if (!status) status = limb_bones_make(limb, &error);
-  if (!status) status = limb_surface_make(limb, &error);
-  if (!status) status = limb_vessels_make(limb, &error);
-  if (status) fail_msg("member %u: %s", k, error.message);
-  return limb;
-}
+static sonde_limb *member(uint32_t k, sonde_limb_side side) { return bare_limb(k, 3000, side); }
 
 static sonde_limb *family[FAMILY];
 static sonde_limb_station stations[FAMILY][SONDE_LIMB_STATIONS];
