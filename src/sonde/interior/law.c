@@ -11,15 +11,17 @@ static const double artery_wall_pa = 150e3, artery_inner_share = 0.633;
 static const double least_area = 1e-6;             // of the artery under any pressure
 static const double artery_reference_pa = 12665.6; // 95 mmHg
 static const double reference_pa = 1333.22387415; // 10 mmHg: the pressure the model's radii hold at
-// Veins in a loose sheath, published figures (docs/interior_theory.md): area over that at 10 mmHg
-// when filled, when the walls touch, the pressure outside less that inside then, change of pressure
-// per relative area at 10 mmHg (compliance .031 per mmHg femoral, .012 saphenous) and near closing.
-static const double filled_area = 1.75, closed_area = 0.05, closing_pa = 10 * SONDE_PA_PER_MMHG;
-static const double deep_slope_pa = SONDE_PA_PER_MMHG / 0.031;
-static const double superficial_slope_pa = SONDE_PA_PER_MMHG / 0.012;
-static const double closing_slope_pa = 8 * SONDE_PA_PER_MMHG;
-// An artery in a loose sheath: pressure per relative diameter; it buckles around this pressure
-// below zero, over that range.
+// Veins in a loose sheath by published figures (docs/interior_theory.md). Areas are relative to the
+// area at 10 mmHg, slopes are transmural pressure over relative area.
+static const double filled_area = 1.75; // no pressure fills a vein beyond this area
+static const double closed_area = 0.05; // the walls begin to touch, outside closing_pa above inside
+static const double closing_pa = 10 * SONDE_PA_PER_MMHG;
+static const double deep_slope_pa = SONDE_PA_PER_MMHG / 0.031;        // femoral vein at 10 mmHg
+static const double superficial_slope_pa = SONDE_PA_PER_MMHG / 0.012; // great saphenous vein there
+static const double closing_slope_pa = 8 * SONDE_PA_PER_MMHG;         // where the walls touch
+static const double least_slope = 1.5; // of a soft wall at 10 mmHg, over closing_slope_pa
+// An artery in a loose sheath: transmural pressure over relative diameter; its wall buckles where
+// the transmural pressure is buckling_pa below zero, within some buckling_width_pa.
 static const double artery_modulus_pa = 150e3;
 static const double buckling_pa = 7 * SONDE_PA_PER_MMHG, buckling_width_pa = 3 * SONDE_PA_PER_MMHG;
 
@@ -65,9 +67,9 @@ double sonde_vein_tube_pressure(double a, double wall_pa) {
   return cubic + (wall - study_wall_pa) * ring_pressure(a, ring_inner_share);
 }
 
-// Transmural pressure (Pa) of a vein in a loose sheath, with area a over that at 10 mmHg. Filled,
-// it approaches the area of standing; below 10 mmHg its walls come together at closing_pa below
-// zero, over a power that joins the slopes at rest and at closing.
+// Transmural pressure (Pa) of a vein in a loose sheath whose area is a times that at 10 mmHg. Above
+// 10 mmHg the area approaches filled_area; below, it follows a power of a that leaves 10 mmHg with
+// slope_pa and reaches closed_area at -closing_pa with closing_slope_pa.
 static double loose_pressure(double a, double slope_pa) {
   SONDE_ASSERT(a > 0 && a < filled_area && slope_pa > closing_slope_pa);
   if (a >= 1)
@@ -78,16 +80,19 @@ static double loose_pressure(double a, double slope_pa) {
          closing_slope_pa * (a - 1);
 }
 
-// A vein's wall and what holds it; lengths of the areas: a over the area at 10 mmHg.
+// The wall of a vein and the tissue that it lies in. Areas are relative to the area at 10 mmHg.
 typedef struct vein_wall {
-  double wall_pa, sheath, hold;
-  double slope_pa;   // of the loose vein's pressure at 10 mmHg
-  double glued_area; // of the glued vein at 10 mmHg over its stress-free one
-  double touch_area; // walls begin to touch
+  double wall_pa;    // shear modulus; 0: the study's
+  double sheath;     // 0 loose .. 1 glued
+  double hold;       // shear modulus of the tissue around over that of muscle
+  double slope_pa;   // pressure over relative area at 10 mmHg, in a loose sheath
+  double glued_area; // of the glued vein at 10 mmHg over its stress-free area
+  double touch_area; // the walls begin to touch
 } vein_wall;
 
-// What resists the closing of a glued vein is the tissue around, which has to follow inwards: the
-// negative pressures scale with its modulus.
+// Transmural pressure (Pa) at a relative area, between loose and glued by the sheath. A glued vein
+// that closes draws the tissue around it inwards: its negative pressures scale with that tissue's
+// modulus.
 static double wall_pressure(const vein_wall *w, double a) {
   double loose = w->sheath < 1 ? loose_pressure(a, w->slope_pa) : 0, glued = 0;
   if (w->sheath > 0) glued = sonde_vein_tube_pressure(a * w->glued_area, w->wall_pa);
@@ -95,8 +100,8 @@ static double wall_pressure(const vein_wall *w, double a) {
   return loose + w->sheath * (glued - loose);
 }
 
-// The area at a transmural pressure, which rises with it; bracketed Newton. Below the touch of the
-// walls an exponential tail keeps the slope.
+// Relative area at a transmural pressure, by Newton's method between bounds: the pressure rises
+// with the area. Once the walls touch, the area falls off exponentially from the slope there.
 static double open_area(const vein_wall *w, double transmural_pa) {
   SONDE_ASSERT(isfinite(transmural_pa) && w->hold > 0);
   const double d = 1e-5;
@@ -118,6 +123,7 @@ static double open_area(const vein_wall *w, double transmural_pa) {
   return a;
 }
 
+// The wall as a pathology describes it, between muscles or in the fat.
 static vein_wall wall_of(const sonde_pathology *pathology, bool in_fat) {
   double wall = pathology->wall_shear_pa;
   vein_wall w = {.wall_pa = wall,
@@ -127,7 +133,7 @@ static vein_wall wall_of(const sonde_pathology *pathology, bool in_fat) {
                  .touch_area = closed_area};
   w.slope_pa = in_fat ? superficial_slope_pa : deep_slope_pa;
   if (wall > 0) w.slope_pa *= clamp(wall, least_wall_pa, most_wall_pa) / study_wall_pa;
-  w.slope_pa = fmax(w.slope_pa, 1.5 * closing_slope_pa);
+  w.slope_pa = fmax(w.slope_pa, least_slope * closing_slope_pa);
   if (w.sheath > 0) {
     vein_wall glued = w;
     glued.sheath = 1, glued.hold = 1, glued.touch_area = contact_area;
