@@ -131,7 +131,10 @@ typedef struct sonde_model {
   sonde_model_kind kind;
   sonde_mesh surface; /**< skin at rest, refined */
   sonde_topology topology;
-  sonde_mesh femur; /**< closed */
+  sonde_mesh femur; /**< closed; of a limb all its bones */
+  /** Middles of the bone that a limb turns about, end to end; NULL: straight along the femur. */
+  sonde_vec3 *bone_axis_m;
+  uint32_t bone_axis_count;
   sonde_surface_law law;
   sonde_vec3 *normal;               /**< [nodes] outward rest normals */
   double *area_m2;                  /**< [nodes] */
@@ -156,6 +159,9 @@ typedef struct sonde_model {
   sonde_vessel vein, artery; /**< femoral vessels */
   /** NULL, or named anatomy (sonde/tissue_anatomy.h); released with the model by sonde_free. */
   struct sonde_thigh_anatomy *anatomy;
+  /** NULL: tissue follows from the layers above; or what knows it at every point
+      (sonde/tissue_anatomy.h); released with the model by map->destroy. */
+  struct sonde_tissue_map *map;
   struct sonde_bulk *bulk; /**< NULL, or of a volumetric model; released with it */
   uint64_t checksum;       /**< of the file's content; 0 before it is saved or loaded */
 } sonde_model;

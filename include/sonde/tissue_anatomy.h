@@ -72,6 +72,62 @@ typedef struct sonde_thigh_anatomy {
   double fascia_medial_m, fascia_lateral_m;
 } sonde_thigh_anatomy;
 
+/** Kinds of tissue beside vessels. */
+typedef enum sonde_tissue {
+  SONDE_TISSUE_OUTSIDE,
+  SONDE_TISSUE_SKIN,
+  SONDE_TISSUE_FAT,
+  SONDE_TISSUE_FASCIA, /**< superficial or deep fascia, septum */
+  SONDE_TISSUE_MUSCLE,
+  SONDE_TISSUE_TENDON,
+  SONDE_TISSUE_NERVE,
+  SONDE_TISSUE_NODE, /**< lymph node */
+  SONDE_TISSUE_BONE
+} sonde_tissue;
+
+/** Signed distances of a rest point, m; negative inside. */
+typedef struct sonde_tissue_depths {
+  double skin_m;        /**< to the skin's outer face */
+  double superficial_m; /**< to the superficial fascia */
+  double fascia_m;      /**< to the deep fascia */
+  double bone_m;        /**< to the nearest bone */
+} sonde_tissue_depths;
+
+/** Most cells that are in reach of one picture. */
+enum { SONDE_MAP_SEEDS = 24 };
+
+/**
+ * A cell of the power diagram that parts the muscles: a point of a section belongs to the cell of
+ * the seed with the least |p - seed|^2 - weight.
+ */
+typedef struct sonde_map_seed {
+  uint32_t cell;        /**< seeds with one cell have no boundary between them */
+  uint32_t section;     /**< compartment; a septum parts two of them */
+  bool muscle;          /**< false: fat between muscles */
+  sonde_vec3 fibre;     /**< unit, along the belly's fibres */
+  double pennation_rad; /**< between fibres and belly */
+} sonde_map_seed;
+
+/**
+ * What knows the tissue of a model at every rest point, from a description finer than its layers.
+ * All functions answer for points of the model's frame, from any thread, without allocation.
+ */
+typedef struct sonde_tissue_map {
+  void *self;
+  void (*depths)(const void *self, sonde_vec3 rest_m, sonde_tissue_depths *depths);
+  /** Vessels are not in it: they are the model's. */
+  sonde_tissue (*tissue)(const void *self, sonde_vec3 rest_m);
+  /** Seeds that matter within a distance of a point, nearest first, at most `room`; their number.
+   */
+  uint32_t (*seeds)(const void *self, sonde_vec3 rest_m, double within_m, uint32_t room,
+                    uint32_t *seed);
+  sonde_map_seed (*seed)(const void *self, uint32_t seed, sonde_vec3 rest_m);
+  /** |p - seed|^2 - weight of seeds at a rest point, m^2, and where the seeds are there. */
+  void (*powers)(const void *self, sonde_vec3 rest_m, uint32_t count, const uint32_t *seed,
+                 double *power_m2, sonde_vec3 *at_m);
+  void (*destroy)(struct sonde_tissue_map *map);
+} sonde_tissue_map;
+
 /** The landmark or branch with that name, NULL when absent. @thread any */
 SONDE_API const sonde_landmark *sonde_anatomy_landmark(const sonde_thigh_anatomy *anatomy,
                                                        const char *name);

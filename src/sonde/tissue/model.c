@@ -1,5 +1,6 @@
 // Building, changing and releasing the thigh model.
 #include "tissue/model.h"
+#include "sonde/tissue_anatomy.h"
 #include "tissue/bulk/bulk.h"
 
 #include "base/base.h"
@@ -252,13 +253,14 @@ sonde_status sonde_model_set_parameters(sonde_model *model, const sonde_surface_
 
 void sonde_model_destroy(sonde_model *model) {
   if (!model) return;
-  void *arrays[] = {model->normal,       model->area_m2,        model->mass_kg,
-                    model->k0_n_m3,      model->xm_m,           model->fat_depth_m,
-                    model->bone_depth_m, model->muscle_depth_m, model->edge_rest_m,
-                    model->edge_share,   model->face_area_m2,   model->face_half_cotangent,
-                    model->face_edge,    model->sites,          model->data,
-                    model->anatomy,      model->shear_share,    model->limit_share};
+  void *arrays[] = {
+      model->normal,      model->area_m2,     model->mass_kg,      model->k0_n_m3,
+      model->xm_m,        model->fat_depth_m, model->bone_depth_m, model->muscle_depth_m,
+      model->edge_rest_m, model->edge_share,  model->face_area_m2, model->face_half_cotangent,
+      model->face_edge,   model->sites,       model->data,         model->anatomy,
+      model->shear_share, model->limit_share, model->bone_axis_m};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
+  if (model->map) model->map->destroy(model->map);
   sonde_bulk_destroy(model->bulk);
   sonde_topology_clear(&model->topology);
   sonde_mesh_clear(&model->surface);
