@@ -112,8 +112,9 @@ void settled_json_jumps(const settled *s) {
 void settled_update(const settled *s, const sonde_pathology *pathology, double cuff_pa,
                     uint64_t tick) {
   if (!s->interior) return;
-  sonde_interior_update(s->interior, &(sonde_interior_input){
-                                         sonde_state_positions(s->state),
-                                         sonde_state_contact_forces(s->state), s->pose, pathology,
-                                         -1, tick, s->probe.half_x_m, s->probe.half_y_m, cuff_pa});
+  sonde_interior_update(s->interior,
+                        &(sonde_interior_input){sonde_state_positions(s->state),
+                                                sonde_state_contact_forces(s->state), s->pose,
+                                                pathology, -1, tick, s->probe.half_x_m,
+                                                s->probe.half_y_m, cuff_pa, SONDE_POSTURE_SUPINE});
 }

@@ -27,6 +27,9 @@ typedef enum sonde_label {
   SONDE_LABEL_NODE, /**< lymph node */
   SONDE_LABEL_CYST,
   SONDE_LABEL_HAEMATOMA,
+  SONDE_LABEL_FASCIA, /**< this one and the following of models with a tissue map only */
+  SONDE_LABEL_TENDON,
+  SONDE_LABEL_NERVE,
   SONDE_LABEL_COUNT
 } sonde_label;
 
@@ -100,6 +103,14 @@ SONDE_API sonde_status sonde_interior_set_vein_depth(sonde_interior *interior,
                                                      sonde_vec3 below_skin_m, double depth_m,
                                                      sonde_error *error);
 
+/** Posture of the leg. */
+typedef enum sonde_posture {
+  SONDE_POSTURE_SUPINE,
+  SONDE_POSTURE_SITTING,
+  SONDE_POSTURE_STANDING,
+  SONDE_POSTURE_COUNT
+} sonde_posture;
+
 /** What one update reads; all borrowed for the call. */
 typedef struct sonde_interior_input {
   const sonde_vec3 *positions_m;      /**< [nodes] deformed skin */
@@ -113,6 +124,8 @@ typedef struct sonde_interior_input {
    */
   double face_half_x_m, face_half_y_m;
   double cuff_pa; /**< uniform pressure on every vessel from outside, beside the probe's */
+  /** Of a limb: blood's own weight raises the groin's pressures below it. */
+  sonde_posture posture;
 } sonde_interior_input;
 
 /** New surface state: solves the field, the stress at the vessels and their areas.
@@ -138,14 +151,6 @@ SONDE_API bool sonde_interior_vessel_at_plane(const sonde_interior *interior, in
                                               sonde_vessel_state *state);
 /** @thread any, not during an update */
 SONDE_API uint64_t sonde_interior_tick(const sonde_interior *interior);
-
-/** Posture of the leg. */
-typedef enum sonde_posture {
-  SONDE_POSTURE_SUPINE,
-  SONDE_POSTURE_SITTING,
-  SONDE_POSTURE_STANDING,
-  SONDE_POSTURE_COUNT
-} sonde_posture;
 
 /** What moves the pressures in time. */
 typedef struct sonde_circulation {

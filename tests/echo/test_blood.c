@@ -128,7 +128,7 @@ static void amount_follows_the_area(void **state) {
   bench b;
   bench_create(&b, leg_radius, 0.014, 0.012, false, true);
   b.leg.model.artery.count = 0;
-  b.interior->section_count[1] = 0;
+  b.interior->course[1].count = 0;
   double full = 0, area = 0, least = 1;
   for (double n = 0; n < 30; n += 6) {
     push(&b, n);

@@ -13,7 +13,8 @@ static void look_with(bench *b, face f) {
   b->interior->model = &b->leg.model;
   sonde_interior_update(b->interior,
                         &(sonde_interior_input){b->leg.model.surface.vertices, b->forces, b->pose,
-                                                &b->pathology, -1, 1, INFINITY, INFINITY, 0});
+                                                &b->pathology, -1, 1, INFINITY, INFINITY, 0,
+                                                SONDE_POSTURE_SUPINE});
   sonde_echo_render(b->echo, b->pose, f.aperture_m, &b->pathology, &b->settings, &b->image);
 }
 

@@ -85,7 +85,8 @@ static void look_at_pose(rig *r, const probe_kind *p) {
   b->interior->model = &b->leg.model;
   sonde_interior_update(b->interior,
                         &(sonde_interior_input){b->leg.model.surface.vertices, b->forces, b->pose,
-                                                &b->pathology, -1, 1, INFINITY, INFINITY, 0});
+                                                &b->pathology, -1, 1, INFINITY, INFINITY, 0,
+                                                SONDE_POSTURE_SUPINE});
   b->echo->frame.pathology = &b->pathology;
   sonde_echo_frame(b->echo, b->pose, p->aperture_m, &b->settings);
   sonde_echo_plane(b->echo);

@@ -62,8 +62,8 @@ static void press(limb *l, double force_n, double dent_m) {
       l->load[i] = under && force_n > 0 ? vec3(0, -force_n / touched, 0) : vec3(0, 0, 0);
       moved[i] = v_madd(skin->vertices[i], -dent_m * w, vec3(0, 1, 0));
     }
-  sonde_interior_update(
-      l->in, &(sonde_interior_input){moved, l->load, pose, &healthy, -1, 1, 0.03, 0.006, 0});
+  sonde_interior_update(l->in, &(sonde_interior_input){moved, l->load, pose, &healthy, -1, 1, 0.03,
+                                                       0.006, 0, SONDE_POSTURE_SUPINE});
   sonde_free(moved);
 }
 

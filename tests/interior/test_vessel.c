@@ -183,8 +183,9 @@ static sonde_interior *loaded(const tube *t, double force, const char *name, dou
       if (pass == 0) ++touched;
       load[i] = vec3(0, -force / touched, 0);
     }
-  sonde_interior_update(in, &(sonde_interior_input){t->model.surface.vertices, load, pose, &p, dt,
-                                                    1, INFINITY, INFINITY, 0});
+  sonde_interior_update(in,
+                        &(sonde_interior_input){t->model.surface.vertices, load, pose, &p, dt, 1,
+                                                INFINITY, INFINITY, 0, SONDE_POSTURE_SUPINE});
   if (dt < 0) return in;
   sonde_free(load);
   return in;

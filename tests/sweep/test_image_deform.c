@@ -52,8 +52,9 @@ static void update(bench *b, const char *name, double venous_mmhg, double push_n
       if (pass == 1) b->forces[i] = under ? v_scale(way, push_n / touched) : vec3(0, 0, 0);
     }
   b->interior->model = &b->leg.model; // the bench was returned by value
-  sonde_interior_update(b->interior, &(sonde_interior_input){b->positions, b->forces, b->press.pose,
-                                                             &p, -1, 1, 0.02, 5e-3, 0});
+  sonde_interior_update(b->interior,
+                        &(sonde_interior_input){b->positions, b->forces, b->press.pose, &p, -1, 1,
+                                                0.02, 5e-3, 0, SONDE_POSTURE_SUPINE});
 }
 
 static bench make(void) {

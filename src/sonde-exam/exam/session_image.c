@@ -73,6 +73,7 @@ bool sonde_session_follow(sonde_session *session) {
         .tick = head->snapshot.tick,
         .face_half_x_m = session->probes[head->snapshot.probe].half_x_m,
         .face_half_y_m = session->probes[head->snapshot.probe].half_y_m,
+        .posture = head->controls.posture,
     };
     sonde_interior_update(session->interior, &input);
     session->shown = true;

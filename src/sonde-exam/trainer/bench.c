@@ -60,7 +60,8 @@ sonde_snapshot sonde_bench_look(sonde_bench *bench, sonde_pose probe) {
                                   .dt_s = bench->looked ? since_s : -1,
                                   .tick = bench->tick,
                                   .face_half_x_m = bench->probe.half_x_m,
-                                  .face_half_y_m = bench->probe.half_y_m};
+                                  .face_half_y_m = bench->probe.half_y_m,
+                                  .posture = bench->circulation.posture};
     sonde_interior_update(bench->interior, &input);
     bench->looked_tick = bench->tick;
     sonde_snapshot_read_vessels(bench->interior, &s);

@@ -60,19 +60,19 @@ void sonde_echo_blood(sonde_echo *echo) {
   SONDE_ASSERT(echo->frame.pathology != NULL);
   echo->bled = 0;
   for (uint32_t shown = 0; shown < echo->shown_count; ++shown) {
-    const uint32_t which = echo->shown[shown], sections = in->section_count[which];
+    const uint32_t which = echo->shown[shown], sections = in->course[which].count;
     if (sections < 2) continue;
     // Path of the mean flow in a vessel since t = 0, m.
     const sonde_echo_flow *flow = &echo->flow;
     const double rate = flow->circulation.heart_rate_hz;
     double flowed_m = 0;
-    if (in->kind[which] != SONDE_VESSEL_VEIN)
+    if (in->course[which].kind != SONDE_VESSEL_VEIN)
       flowed_m = rate > 0 ? -flow->artery_m_s / rate * beats_of(&flow->circulation, flow->t_s)
                           : -flow->artery_m_s * flow->t_s;
     else if (!(sonde_echo_pathology(echo, which)->thrombus_fraction >= 1))
       flowed_m = flow->vein_m_s * flow->t_s;
-    const int32_t first = (int32_t)ceil(in->section[which][0].s_m / sonde_segment_m);
-    const int32_t last = (int32_t)floor(in->section[which][sections - 1].s_m / sonde_segment_m);
+    const int32_t first = (int32_t)ceil(in->section[which][0].along_m / sonde_segment_m);
+    const int32_t last = (int32_t)floor(in->section[which][sections - 1].along_m / sonde_segment_m);
     sonde_vessel_state low, high;
     bool known = sonde_vessel_at(in, which, first * sonde_segment_m, &low);
     for (int32_t k = first; k < last && known; ++k, low = high) {

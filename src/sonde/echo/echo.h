@@ -27,7 +27,6 @@ enum {
   SONDE_SLAB_ROWS = 256, // depths at which the slab's height is tabulated
 };
 
-_Static_assert((int)MOST_VESSELS == (int)SONDE_VESSELS, "vessels in view");
 _Static_assert((int)MOST_LESIONS == (int)SONDE_LESIONS, "lesions in view");
 
 // An interface on one column of the grid, carrier phase included.

@@ -169,7 +169,7 @@ typedef struct tissue_job {
   uint32_t vessels, lesions;          // in view; the first two are the femoral vein and artery
   tissue_vessel vessel[MOST_VESSELS]; // branches after their parents
   tissue_lesion lesion[MOST_LESIONS];
-  float bone_radius_m;
+  float bone_radius_m;       // of the cylinder about the leg's axis
   float webs, oedema;        // 0..1
   float rough_bone, rough_m; // amplitude over muscle on a level cortex, fading over so far from it
   float rows_per_m;          // of the march, 0 in its first row

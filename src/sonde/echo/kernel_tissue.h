@@ -170,7 +170,7 @@ INLINE ints paint(const tissue_job *job, uint32_t l) {
   floats across = vload(f + PLANE_ACROSS * n), up = vload(f + PLANE_UP * n);
   floats theta = vload(f + PLANE_THETA * n), s = vload(f + PLANE_S * n), level[MOST_LEVELS];
   level[0] = depth, level[1] = depth - fat, level[2] = depth - muscle;
-  level[3] = job->bone_radius_m - vsqrt(across * across + up * up);
+  level[3] = vload(f + PLANE_BONE * n) + (job->bone_radius_m - vsqrt(across * across + up * up));
   floats *wall = level + LAYER_LEVELS, *edge = wall + job->vessels;
   for (uint32_t v = 0; v < job->vessels; ++v) {
     const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n, *half = at + VESSEL_HALF_SHORT * n;

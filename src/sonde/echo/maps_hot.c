@@ -56,10 +56,10 @@ static void map_pieces(sonde_echo *echo, const moved_cube *c) {
   // The lumina that a cube touches, over its coordinates; solid clot belongs to the tissue. The
   // fewer the area, the denser the tissue's scatterers are in it: clutter keeps its power.
   uint32_t lumens = 0;
-  const float_x4 along = point_of(echo->interior->axis);
   for (uint32_t k = 0; k < c->walls; ++k) {
     const float(*w)[WALL_ROOM] = echo->cubes->wall[k];
-    const uint32_t g = c->group;
+    const uint32_t g = c->group, which = echo->shown[c->wall[k].vessel];
+    const float_x4 along = point_of(echo->interior->course[which].line);
     const float_x4 centre = {w[WALL_REST][g], w[WALL_REST + 1][g], w[WALL_REST + 2][g], 0},
                    flat = {w[WALL_FLAT][g], w[WALL_FLAT + 1][g], w[WALL_FLAT + 2][g], 0},
                    across = {w[WALL_ACROSS][g], w[WALL_ACROSS + 1][g], w[WALL_ACROSS + 2][g], 0};
@@ -73,7 +73,7 @@ static void map_pieces(sonde_echo *echo, const moved_cube *c) {
                        (float)echo->cell_m * along[1], (float)echo->cell_m * along[2]},
                       c->wall[k].solid > 0 ? 1 - 2 * c->wall[k].solid : 1,
                       sonde_clutter(echo) * sqrtf(w[WALL_SHORT][g] * w[WALL_LONG][g]) * scale,
-                      echo->shown[c->wall[k].vessel]};
+                      which};
     if (c->wall[k].solid < 1 && !is_beyond(l->along) && !is_beyond(l->across)) ++lumens;
   }
   for (uint32_t piece = 0; piece < 8; ++piece) {

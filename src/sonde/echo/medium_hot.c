@@ -35,6 +35,8 @@ static const interface lesion_edges[SONDE_LESION_KINDS] = {
 static const float rough_share = 0.3f, rough_m = 0.4e-3f;
 static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
 
+static const uint32_t lesion_salt = 22; // of the first lesion; far branches have the same ones
+
 // Random number in [-1, 1) of a lattice point.
 static float knot(int32_t a, int32_t b, uint32_t salt) {
   uint32_t h = (uint32_t)a * 0x9e3779b1u ^ (uint32_t)b * 0x85ebca77u ^ salt * 0xc2b2ae3du;
@@ -86,7 +88,7 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
       uint32_t salt = which;
       if (which >= edges) {
         const uint32_t number = echo->lesion[which - edges];
-        kind = &lesion_edges[lesion[number].kind], salt = MOST_LEVELS + number;
+        kind = &lesion_edges[lesion[number].kind], salt = lesion_salt + number;
       } else if (which >= LAYER_LEVELS) {
         kind = &vessel_wall, salt = LAYER_LEVELS + echo->shown[which - LAYER_LEVELS];
       }
@@ -158,10 +160,10 @@ static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
   for (uint32_t k = 0; k < job->vessels; ++k) {
     const uint32_t which = echo->shown[k];
     const sonde_pathology *p = sonde_echo_pathology(echo, which);
-    float wall = wall_m[in->kind[which]];
+    float wall = wall_m[in->course[which].kind];
     if (which >= 2) wall = fminf(wall, thin_wall * (float)in->section[which][0].radius_m);
     float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
-    bool vein = in->kind[which] == SONDE_VESSEL_VEIN;
+    bool vein = in->course[which].kind == SONDE_VESSEL_VEIN;
     job->vessel[k] =
         (tissue_vessel){.wall_m = wall,
                         .clot_fraction = vein ? (float)p->thrombus_fraction : 0,

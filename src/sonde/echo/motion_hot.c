@@ -30,22 +30,22 @@ void sonde_motion_begin(sonde_echo *echo) {
     s->to_place[c] = point_of(v_scale(m_column(&probe, c), step[c]));
     s->to_image[c] = point_of(vec3(local.x / step[0], local.y, local.z / step[2]));
   }
-  // Extent of the box along the leg.
-  double first = INFINITY, last = -INFINITY;
-  for (int k = 0; k < 8; ++k) {
-    sonde_vec3 offset = vec3(k & 1 ? h * echo->box_size[0] : 0, k & 2 ? h * echo->box_size[1] : 0,
-                             k & 4 ? h * echo->box_size[2] : 0);
-    double along = v_dot(v_sub(v_add(s->corner, offset), in->origin), in->axis);
-    first = fmin(first, along), last = fmax(last, along);
-  }
   // Stations of the vessels in view that lie there, and the box of what they reach.
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
-    const uint32_t which = echo->shown[k], count = in->section_count[which];
+    const uint32_t which = echo->shown[k], count = in->course[which].count;
     const sonde_vessel_section *section = in->section[which];
+    // Extent of the box along the vessel's line.
+    double first = INFINITY, last = -INFINITY;
+    for (int c = 0; c < 8; ++c) {
+      sonde_vec3 offset = vec3(c & 1 ? h * echo->box_size[0] : 0, c & 2 ? h * echo->box_size[1] : 0,
+                               c & 4 ? h * echo->box_size[2] : 0);
+      double along = v_dot(v_sub(v_add(s->corner, offset), in->origin), in->course[which].line);
+      first = fmin(first, along), last = fmax(last, along);
+    }
     s->low[k] = vset_float_x4(INFINITY), s->high[k] = -s->low[k];
     for (uint32_t i = 0; i < count; ++i) {
-      if (i + 1 < count && section[i + 1].s_m < first) continue;
-      if (i > 0 && section[i - 1].s_m > last) break;
+      if (i + 1 < count && section[i + 1].along_m < first) continue;
+      if (i > 0 && section[i - 1].along_m > last) break;
       const sonde_vessel_state *v = &in->state[which][i];
       s->section[k][i] = (cube_section){point_of(v_sub(v->rest_centre_m, s->corner)),
                                         point_of(v_sub(v->centre_m, v->rest_centre_m)),
@@ -96,12 +96,13 @@ static void find_walls(const sonde_echo *echo, const slab_cube *from, moved_cube
   const double h = echo->cell_m;
   const sonde_vec3 centre =
       vec3((from->number[0] + 0.5) * h, (from->number[1] + 0.5) * h, (from->number[2] + 0.5) * h);
-  const double along_m = v_dot(v_sub(centre, in->origin), in->axis);
+  const double s_m = v_dot(v_sub(centre, in->origin), in->axis);
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
     if (!vall((c->rest >= s->low[k]) & (c->rest <= s->high[k]))) continue;
     const uint32_t which = echo->shown[k];
     uint32_t i;
     double t;
+    const double along_m = sonde_vessel_along(in, which, centre, s_m);
     if (!sonde_vessel_sections(in, which, along_m, &i, &t)) continue;
     const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
     sonde_vec3 middle = v_lerp(a->rest_centre_m, b->rest_centre_m, t);

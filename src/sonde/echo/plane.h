@@ -12,6 +12,7 @@ typedef enum plane_field {
   PLANE_MUSCLE,
   PLANE_ACROSS, // from the leg's axis at rest, m: the distance itself bends too much at the bone
   PLANE_UP,
+  PLANE_BONE,  // what a point lies deeper in bone than in the cylinder about the axis, m
   PLANE_LAYERS // vessels follow, then lesions
 } plane_field;
 
@@ -27,7 +28,7 @@ typedef enum vessel_field {
 
 enum {
   LESION_FIELDS = 3, // coordinates at rest over the semi-axes
-  MOST_VESSELS = 10,
+  MOST_VESSELS = 16, // in view at once
   MOST_LESIONS = 8,
   MOST_FIELDS = PLANE_LAYERS + MOST_VESSELS * VESSEL_FIELDS + MOST_LESIONS * LESION_FIELDS
 };

@@ -10,6 +10,7 @@ enum { FIRST_ITERATIONS = 24, ITERATIONS = 8, NEWTON_ITERATIONS = 4 };
 static const double far_away = 50; // in semi-axes
 static const double step_beside = 1e-3;
 static const double tolerance_m = 1e-7;
+static const double far_view_m = 60e-3;   // of a vessel from where it is at rest, and its reach
 static const double view_margin_m = 8e-3; // slab, a cube and the step between two sections
 
 const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which) {
@@ -18,12 +19,13 @@ const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t whi
 
 double sonde_echo_solid(const sonde_echo *echo, uint32_t which, double z_m) {
   const sonde_pathology *p = sonde_echo_pathology(echo, which);
-  if (echo->interior->kind[which] == SONDE_VESSEL_ARTERY) return 0;
+  if (echo->interior->course[which].kind == SONDE_VESSEL_ARTERY) return 0;
   return sonde_pathology_clot(p, z_m) ? p->thrombus_fraction : 0;
 }
 
 static bool in_view(const sonde_echo *echo, sonde_vec3 point, double reach_m) {
   const frame *f = &echo->frame;
+  SONDE_ASSERT(reach_m >= 0);
   sonde_vec3 at = sonde_echo_unplace(f, pose_apply_inverse(f->probe, point));
   double beside = fabs(at.x - f->first_line) * f->pitch_m - 0.5 * f->aperture_m;
   double above = fmax(-at.z, at.z - f->depth_m), reach = reach_m + view_margin_m;
@@ -48,15 +50,20 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
   p[PLANE_MUSCLE * count] = (float)at.muscle_m;
   p[PLANE_ACROSS * count] = (float)(at.r * cos(at.theta));
   p[PLANE_UP * count] = (float)(at.r * sin(at.theta));
+  const struct sonde_tissue_map *map = in->model->map;
+  sonde_tissue_depths depths;
+  if (map != NULL) map->depths(map->self, rest, &depths);
+  p[PLANE_BONE * count] = map == NULL ? 0 : (float)(at.r - in->bone_radius_m - depths.bone_m);
   // Coordinates in the deformed sections of the vessels. Beyond its end a branch fades away from
   // the last section: neighbours inside and beyond then meet without passing its axis.
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
-    const uint32_t which = echo->shown[k], sections = in->section_count[which];
+    const uint32_t which = echo->shown[k], sections = in->course[which].count;
     sonde_vessel_state v;
     double across = far_away, along = far_away, half_short = 1e-3, half_long = 1e-3, clot = 0;
-    bool there = sonde_vessel_at(in, which, at.s, &v);
+    const double place = sonde_vessel_along(in, which, rest, at.s);
+    bool there = sonde_vessel_at(in, which, place, &v);
     if (!there && which >= 2)
-      v = in->state[which][at.s < in->section[which][0].s_m ? 0 : sections - 1];
+      v = in->state[which][place < in->section[which][0].along_m ? 0 : sections - 1];
     if (there || which >= 2) {
       sonde_vec3 d = v_sub(point, v.centre_m);
       along = v_dot(d, v.flat_axis) / v.half_short_m;
@@ -198,13 +205,31 @@ void sonde_echo_plane(sonde_echo *echo) {
   // stages.
   const sonde_interior *in = echo->interior;
   echo->shown[0] = 0, echo->shown[1] = 1, echo->shown_count = 2;
-  echo->vessels = in->section_count[0] > 0 || in->section_count[1] > 0;
+  echo->vessels = in->course[0].count > 0 || in->course[1].count > 0;
+  // Of more branches than there is room for those that come nearest to the picture's middle; they
+  // stay in their order: branches after their parents.
+  double nearest[MOST_VESSELS] = {0};
+  const sonde_vec3 middle = pose_apply(f->probe, vec3(0, 0, 0.5 * f->depth_m));
+  const double picture_m = hypot(f->aperture_m, f->depth_m);
   for (uint32_t which = 2; which < in->vessel_count; ++which) {
     const sonde_vessel_state *v = in->state[which];
-    bool seen = false;
-    for (uint32_t i = 0; i < in->section_count[which] && !seen; ++i)
-      seen = in_view(echo, v[i].centre_m, 4 * v[i].rest_radius_m);
-    if (seen) echo->shown[echo->shown_count++] = which, echo->vessels = true;
+    const sonde_vessel_course *course = &in->course[which];
+    double near = INFINITY;
+    if (v_distance(course->middle, middle) > course->ball_m + picture_m + far_view_m) continue;
+    for (uint32_t i = 0; i < course->count; ++i)
+      if (in_view(echo, v[i].centre_m, 4 * v[i].rest_radius_m))
+        near = fmin(near, v_distance(v[i].centre_m, middle));
+    if (!isfinite(near)) continue;
+    uint32_t place = echo->shown_count;
+    if (place == MOST_VESSELS) {
+      for (uint32_t k = place = 2; k < MOST_VESSELS; ++k)
+        if (nearest[k] > nearest[place]) place = k;
+      if (nearest[place] <= near) continue;
+      for (; place + 1 < MOST_VESSELS; ++place)
+        echo->shown[place] = echo->shown[place + 1], nearest[place] = nearest[place + 1];
+    }
+    echo->shown[place] = which, nearest[place] = near, echo->shown_count = place + 1;
+    echo->vessels = true;
   }
   echo->lesion_count = 0;
   for (uint32_t k = 0; k < in->findings.lesion_count; ++k) {

@@ -6,6 +6,9 @@
 // up to the heart, part of it carried by the valves (docs/interior.md).
 static const double posture_mmhg[SONDE_POSTURE_COUNT] = {10, 25, 40};
 static const double rise_s = 0.6; // of a strain, and of its release
+// Specific weight of blood, and the share of its column that veins carry standing: 76 to 79 mmHg at
+// the ankle, 40 at the groin. The knee's share of the way from the hip to the ankle.
+static const double blood_pa_m = 1055 * 9.81, standing_share = 0.58, knee_share = 0.52;
 
 sonde_circulation sonde_circulation_default(void) {
   return (sonde_circulation){.posture = SONDE_POSTURE_SUPINE,
@@ -47,6 +50,18 @@ double sonde_venous_pressure(const sonde_circulation *c, double t) {
   double breath = c->breath_pa * sin(2 * SONDE_PI * fmod(c->breath_rate_hz * t, 1));
   return posture_mmhg[c->posture] * SONDE_PA_PER_MMHG + (1 - strain) * breath +
          strain * c->valsalva_pa;
+}
+
+double sonde_hydrostatic_pressure(const sonde_interior *in, sonde_posture posture,
+                                  sonde_vessel_kind kind, double s) {
+  SONDE_ASSERT(in != NULL && posture < SONDE_POSTURE_COUNT);
+  const sonde_model *m = in->model;
+  if (m->bone_axis_m == NULL || posture == SONDE_POSTURE_SUPINE) return 0;
+  double hip = m->bone_axis_m[0].z, ankle = m->bone_axis_m[m->bone_axis_count - 1].z;
+  double below = s + in->origin.z - hip;
+  if (posture == SONDE_POSTURE_SITTING)
+    return blood_pa_m * fmax(0, below - knee_share * (ankle - hip)); // the calf hangs
+  return blood_pa_m * below * (kind == SONDE_VESSEL_VEIN ? standing_share : 1);
 }
 
 // The systolic and the dicrotic wave add up to a pulse that spans exactly 0..1 over a beat.

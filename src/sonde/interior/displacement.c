@@ -79,9 +79,13 @@ sonde_vec3 sonde_vessels_smooth(const sonde_vessel_state *near, uint32_t count, 
 uint32_t sonde_vessels_near(const sonde_interior *in, sonde_vec3 rest, double s,
                             sonde_vessel_state near[SONDE_VESSELS]) {
   uint32_t count = 0;
-  for (uint32_t which = 0; which < in->vessel_count; ++which)
-    if (which < 2 || sonde_vessel_reaches(in, which, s, rest, 0))
-      count += sonde_vessel_at(in, which, s, &near[count]);
+  for (uint32_t which = 0; which < 2; ++which) count += sonde_vessel_at(in, which, s, &near[count]);
+  for (uint64_t left = sonde_vessels_reaching(in, rest, s); left != 0; left &= left - 1) {
+    const uint32_t which = 2 + (uint32_t)__builtin_ctzll(left);
+    const double along = sonde_vessel_along(in, which, rest, s);
+    if (sonde_vessel_reaches(in, which, along, rest, 0))
+      count += sonde_vessel_at(in, which, along, &near[count]);
+  }
   return count;
 }
 
@@ -103,7 +107,7 @@ sonde_vec3 sonde_interior_displacement(const sonde_interior *in, sonde_vec3 rest
   SONDE_ASSERT(in != NULL);
   sonde_column_point at;
   if (!in->ready || !sonde_interior_locate(in, rest, &at)) return vec3(0, 0, 0);
-  if (at.depth_m < 0 || at.r <= in->bone_radius_m) return vec3(0, 0, 0);
+  if (at.depth_m < 0 || sonde_interior_in_bone(in, rest, &at)) return vec3(0, 0, 0);
   return sonde_vessels_displace(in, rest, at.s);
 }
 
@@ -159,7 +163,9 @@ sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point)
   // In a lumen the map across is known both ways; along the vessel the field moves the point.
   for (uint32_t which = 0; which < in->vessel_count; ++which) {
     sonde_vessel_state v;
-    if (!sonde_vessel_at(in, which, at.s, &v) || v.coupling < 1 || v.tissue_smoothing < 1) continue;
+    const double along = sonde_vessel_along(in, which, rest, at.s);
+    if (!sonde_vessel_at(in, which, along, &v) || v.coupling < 1 || v.tissue_smoothing < 1)
+      continue;
     sonde_vec3 d = v_sub(point, v.centre_m), across = v_cross(v.axis, v.flat_axis);
     double a = v_dot(d, v.flat_axis) / v.half_short_m, b = v_dot(d, across) / v.half_long_m;
     if (a * a + b * b > 1) continue;

@@ -144,6 +144,14 @@ sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
   return v_madd(v_madd(v_scale(in->e1, u[0]), u[1], in->e2), u[2], in->axis);
 }
 
+uint64_t sonde_vessels_reaching(const sonde_interior *in, sonde_vec3 rest, double s) {
+  if (in->reached == NULL) return 0;
+  const double i = floor(to_polar(in, rest).theta / in->theta_step);
+  const double j = clamp(floor((s - in->s_first_m) / in->s_step_m), 0, in->s_count - 1);
+  const uint32_t n = in->theta_count, column = (uint32_t)((int64_t)i + n) % n;
+  return in->reached[(uint32_t)j * n + column];
+}
+
 void sonde_interior_column(const sonde_interior *in, double theta, double s,
                            sonde_column_point *at) {
   stencil st = stencil_at(in, theta / in->theta_step, (s - in->s_first_m) / in->s_step_m);
@@ -159,6 +167,15 @@ bool sonde_interior_locate(const sonde_interior *in, sonde_vec3 rest, sonde_colu
   at->r = q.r;
   at->depth_m = (at->radius_m - q.r) * at->cosine;
   return q.s >= in->s_low_m && q.s <= in->s_high_m;
+}
+
+bool sonde_interior_in_bone(const sonde_interior *in, sonde_vec3 rest,
+                            const sonde_column_point *at) {
+  const struct sonde_tissue_map *map = in->model->map;
+  sonde_tissue_depths depths;
+  if (map == NULL) return at->r <= in->bone_radius_m;
+  map->depths(map->self, rest, &depths);
+  return depths.bone_m <= 0;
 }
 
 bool sonde_interior_stress(const sonde_interior *in, sonde_vec3 rest, sonde_mat3 *stress) {
@@ -199,14 +216,17 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *in, sonde_vec3 point, son
 static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, double s) {
   static const double wall_m[2] = {0.7e-3, 0.9e-3}, wall_share = 0.25;
   sonde_label wall = SONDE_LABEL_COUNT;
+  const uint64_t reaching = sonde_vessels_reaching(in, rest, s);
   for (uint32_t which = 0; which < in->vessel_count; ++which) {
-    const bool artery = in->kind[which] == SONDE_VESSEL_ARTERY;
+    const bool artery = in->course[which].kind == SONDE_VESSEL_ARTERY;
     sonde_vessel_state v;
-    if (which >= 2 && !sonde_vessel_reaches(in, which, s, rest, 0)) continue;
-    if (!sonde_vessel_at(in, which, s, &v)) continue;
+    if (which >= 2 && !(reaching >> (which - 2) & 1)) continue;
+    const double along = sonde_vessel_along(in, which, rest, s);
+    if (which >= 2 && !sonde_vessel_reaches(in, which, along, rest, 0)) continue;
+    if (!sonde_vessel_at(in, which, along, &v)) continue;
     sonde_vec3 d = v_sub(rest, v.rest_centre_m);
     d = v_madd(d, -v_dot(d, v.axis), v.axis);
-    double r = v_norm(d), thick = wall_m[in->kind[which]];
+    double r = v_norm(d), thick = wall_m[in->course[which].kind];
     if (which >= 2) thick = fmin(thick, wall_share * v.rest_radius_m);
     if (r > v.rest_radius_m + thick) continue;
     if (r > v.rest_radius_m) {
@@ -220,7 +240,7 @@ static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, doubl
     if (p->thrombus_fraction >= 1) return SONDE_LABEL_THROMBUS;
     double deep = -v_dot(d, v.flat_axis) / v.rest_radius_m;
     double across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.rest_radius_m;
-    bool clot = deep > 1 - 2 * p->thrombus_fraction + sonde_clot_surface(which, s, across);
+    bool clot = deep > 1 - 2 * p->thrombus_fraction + sonde_clot_surface(which, along, across);
     return clot ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
   }
   return wall;
@@ -232,11 +252,25 @@ sonde_label sonde_interior_label(const sonde_interior *in, sonde_vec3 rest, doub
   bool within = sonde_interior_locate(in, rest, &at);
   if (depth_m != NULL) *depth_m = at.depth_m;
   if (!within || at.depth_m < 0) return SONDE_LABEL_OUTSIDE;
-  if (at.r <= in->bone_radius_m) return SONDE_LABEL_BONE;
+  const struct sonde_tissue_map *map = in->model->map;
+  sonde_label known = SONDE_LABEL_COUNT;
+  if (map != NULL) {
+    static const sonde_label of[] = {
+        [SONDE_TISSUE_OUTSIDE] = SONDE_LABEL_OUTSIDE, [SONDE_TISSUE_SKIN] = SONDE_LABEL_SKIN,
+        [SONDE_TISSUE_FAT] = SONDE_LABEL_FAT,         [SONDE_TISSUE_FASCIA] = SONDE_LABEL_FASCIA,
+        [SONDE_TISSUE_MUSCLE] = SONDE_LABEL_MUSCLE,   [SONDE_TISSUE_TENDON] = SONDE_LABEL_TENDON,
+        [SONDE_TISSUE_NERVE] = SONDE_LABEL_NERVE,     [SONDE_TISSUE_NODE] = SONDE_LABEL_NODE,
+        [SONDE_TISSUE_BONE] = SONDE_LABEL_BONE};
+    known = of[map->tissue(map->self, rest)];
+    if (known == SONDE_LABEL_OUTSIDE || known == SONDE_LABEL_BONE) return known;
+  } else if (sonde_interior_in_bone(in, rest, &at)) {
+    return SONDE_LABEL_BONE;
+  }
   sonde_label vessel = vessel_label(in, rest, at.s);
   if (vessel != SONDE_LABEL_COUNT) return vessel;
   sonde_label lesion = sonde_lesion_label(in, rest);
   if (lesion != SONDE_LABEL_COUNT) return lesion;
+  if (map != NULL) return known;
   if (at.depth_m < at.fat_m) return SONDE_LABEL_SKIN;
   return at.depth_m < at.muscle_m ? SONDE_LABEL_FAT : SONDE_LABEL_MUSCLE;
 }

@@ -97,7 +97,7 @@ sonde_status sonde_interior_set_findings(sonde_interior *in, const sonde_finding
       if (strcmp(f->branch[other].branch, b->branch) == 0)
         return sonde_fail(error, SONDE_ARGUMENT, "branch '%s' is named twice", b->branch);
     bool clot = p->thrombus_fraction > 0;
-    if (clot && in->kind[which] == SONDE_VESSEL_ARTERY)
+    if (clot && in->course[which].kind == SONDE_VESSEL_ARTERY)
       return sonde_fail(error, SONDE_ARGUMENT, "'%s' is an artery; clots lie in veins", b->branch);
     if (!within(p->thrombus_fraction, 0, 1) || !within(p->echogenicity, 0, 1) ||
         (clot && !within(p->thrombus_modulus_pa, 100, 1e7)) || !within(p->lumen_scale, 0.1, 3) ||
@@ -106,6 +106,7 @@ sonde_status sonde_interior_set_findings(sonde_interior *in, const sonde_finding
   }
   if (status) return status;
   in->findings = *f;
+  sonde_sections_mark(in); // a wider lumen reaches farther
   for (uint32_t k = 0; k < f->lesion_count; ++k) in->lesion[k] = frame_of(in, &f->lesion[k]);
   return SONDE_OK;
 }
@@ -114,11 +115,13 @@ sonde_status sonde_interior_set_findings(sonde_interior *in, const sonde_finding
 void sonde_findings_apply(sonde_interior *in, const sonde_pathology *pathology) {
   SONDE_ASSERT(in->vessel_count >= 2 && in->vessel_count <= SONDE_VESSELS);
   in->pathology[0] = in->pathology[1] = *pathology;
-  for (uint32_t which = 2; which < in->vessel_count; ++which) {
+  for (uint32_t which = 2; which < in->vessel_count; ++which)
     in->pathology[which] = (sonde_pathology){.lumen_scale = 1};
-    for (uint32_t k = 0; k < in->findings.branch_count; ++k)
-      if (find_branch(in, in->findings.branch[k].branch) == which)
-        in->pathology[which] = in->findings.branch[k].pathology;
+  for (uint32_t k = 0; k < in->findings.branch_count; ++k) {
+    const uint32_t which = find_branch(in, in->findings.branch[k].branch);
+    if (which < in->vessel_count) in->pathology[which] = in->findings.branch[k].pathology;
+  }
+  for (uint32_t which = 2; which < in->vessel_count; ++which) {
     in->pathology[which].venous_pressure_pa = pathology->venous_pressure_pa;
     in->pathology[which].arterial_pressure_pa = pathology->arterial_pressure_pa;
   }

@@ -119,7 +119,7 @@ void sonde_interior_remember(const sonde_interior *in, sonde_interior_memory *me
   if (in->live->ready) store_footprint(&in->live->grid.footprint, memory->live);
   if (in->building) store_footprint(&in->next->grid.footprint, memory->next);
   for (int which = 0; which < 2; ++which)
-    for (uint32_t i = 0; i < in->section_count[which]; ++i) {
+    for (uint32_t i = 0; i < in->course[which].count; ++i) {
       memory->area_ratio[which][i] = in->state[which][i].area_ratio;
       memory->flat_axis[which][i] = in->state[which][i].flat_axis;
     }
@@ -153,7 +153,7 @@ sonde_status sonde_interior_recall(sonde_interior *in, const sonde_interior_memo
   in->building = m->building, in->built = m->built;
   in->ready = m->ready, in->tick = m->tick, in->solid = false;
   for (int which = 0; which < 2; ++which)
-    for (uint32_t i = 0; i < in->section_count[which]; ++i) {
+    for (uint32_t i = 0; i < in->course[which].count; ++i) {
       in->state[which][i].area_ratio = m->area_ratio[which][i];
       in->state[which][i].flat_axis = m->flat_axis[which][i];
     }

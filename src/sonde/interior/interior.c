@@ -44,6 +44,12 @@ void sonde_interior_destroy(sonde_interior *interior) {
   sonde_free(interior->column);
   sonde_free(interior->field);
   sonde_free(interior->column_grid);
+  sonde_free(interior->reached);
+  for (uint32_t k = 0; k < SONDE_VESSELS; ++k) {
+    sonde_free(interior->section[k]);
+    sonde_free(interior->state[k]);
+    sonde_free(interior->strained[k]);
+  }
   sonde_free(interior->potential);
   sonde_free(interior);
 }

@@ -10,6 +10,7 @@
 #include "sonde/interior.h"
 #include "sparse/direct.h"
 #include "sonde/interior_findings.h"
+#include "sonde/tissue_anatomy.h"
 
 enum { SONDE_SECTIONS = 160, SONDE_VESSELS = 2 + SONDE_BRANCHES };
 
@@ -65,12 +66,26 @@ typedef struct lesion_frame {
 // A vessel's constant section.
 typedef struct sonde_vessel_section {
   sonde_vec3 rest_m, axis;
-  double s_m; // along the femur's axis, ascending
+  double s_m;     // along the leg's axis
+  double along_m; // along the vessel's own straight line, ascending
   double radius_m, depth_m;
   bool in_fat;     // not between muscles
   double tissue_m; // from the skin to the bone
   double coupling; // of the tissue by its wall: 0 where it opens into another vessel, 1 beyond
+  uint64_t beside; // a bit per branch that its wall may meet
 } sonde_vessel_section;
+
+// A vessel. Its sections count along a straight line of its own: the leg's axis, or for a vessel
+// that also runs across the leg the one that it follows best.
+typedef struct sonde_vessel_course {
+  sonde_vessel_kind kind;
+  uint32_t count;    // of sections; 0: a leg without this vessel
+  sonde_vec3 line;   // unit
+  bool tilted;       // not along the leg's axis
+  bool lies[2];      // somewhere between muscles; in the fat
+  sonde_vec3 middle; // of a ball around the sections at rest
+  double ball_m;     // its radius
+} sonde_vessel_course;
 
 struct sonde_interior {
   const sonde_model *model;
@@ -95,12 +110,12 @@ struct sonde_interior {
   bool solid;                  // the last update was solved by the solid
   sonde_interior_method method;
   uint32_t vessel_count; // femoral vein, femoral artery, branches
-  sonde_vessel_kind kind[SONDE_VESSELS];
-  uint32_t section_count[SONDE_VESSELS]; // 0: a leg without this vessel
-  sonde_vessel_section section[SONDE_VESSELS][SONDE_SECTIONS];
-  sonde_vessel_state state[SONDE_VESSELS][SONDE_SECTIONS];
-  bool strained[SONDE_VESSELS][SONDE_SECTIONS]; // of the update: tissue beside it may fold
-  sonde_pathology pathology[SONDE_VESSELS];     // of the last update
+  sonde_vessel_course course[SONDE_VESSELS];
+  sonde_vessel_section *section[SONDE_VESSELS]; // [count], of the femoral vessels [SONDE_SECTIONS]
+  sonde_vessel_state *state[SONDE_VESSELS];     // same shape
+  bool *strained[SONDE_VESSELS];                // same shape; of the update: tissue may fold there
+  uint64_t *reached; // [s_count*theta_count] a bit per branch whose wall may move tissue there
+  sonde_pathology pathology[SONDE_VESSELS]; // of the last update
   sonde_findings findings;
   lesion_frame lesion[SONDE_LESIONS];
   bool ready; // an update has happened
@@ -117,17 +132,28 @@ sonde_vec3 sonde_interior_field(const sonde_interior *interior, sonde_vec3 rest_
 // Inversion of the field from a first guess; *error_m receives the last correction. @thread any
 sonde_vec3 sonde_interior_invert(const sonde_interior *interior, sonde_vec3 point_m,
                                  sonde_vec3 guess_m, int iterations, double *error_m);
+// Whether a point of the leg lies in bone: by the model's map, else by its column. @thread any
+bool sonde_interior_in_bone(const sonde_interior *interior, sonde_vec3 rest_m,
+                            const sonde_column_point *at);
 // Column coordinates and layers of a rest point; false beyond the leg's ends. @thread any
 bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
                            sonde_column_point *at);
 
-// Sections i and i + 1 of a vessel around axial position s and the share between them, 0..1; false
-// beyond the vessel's ends. @thread any
-bool sonde_vessel_sections(const sonde_interior *interior, uint32_t which, double s_m, uint32_t *i,
-                           double *share);
-// State of a vessel interpolated at axial position s. @thread any
-bool sonde_vessel_at(const sonde_interior *interior, uint32_t which, double s_m,
+// Position of a rest point along a vessel's line; that of a vessel along the leg is s. @thread any
+static inline double sonde_vessel_along(const sonde_interior *in, uint32_t which, sonde_vec3 rest_m,
+                                        double s_m) {
+  const sonde_vessel_course *course = &in->course[which];
+  return course->tilted ? v_dot(v_sub(rest_m, in->origin), course->line) : s_m;
+}
+// Sections i and i + 1 of a vessel around a position along its line and the share between them,
+// 0..1; false beyond the vessel's ends. @thread any
+bool sonde_vessel_sections(const sonde_interior *interior, uint32_t which, double along_m,
+                           uint32_t *i, double *share);
+// State of a vessel interpolated at a position along its line. @thread any
+bool sonde_vessel_at(const sonde_interior *interior, uint32_t which, double along_m,
                      sonde_vessel_state *state);
+// Branches whose walls may move a rest point at axial position s, a bit each. @thread any
+uint64_t sonde_vessels_reaching(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);
 // Where the wall warps a point given relative to the centre of the undisturbed cross-section,
 // at rest: the tissue's gradient takes a point of the lumen from there to the lumen as it is.
 // Keeps orientation, fades out with distance. @thread any
@@ -152,7 +178,7 @@ sonde_wall_steps sonde_vessels_trace(const sonde_interior *interior, const sonde
 // Displacement of a rest point at s, vessels included, also beyond the skin. @thread any
 sonde_vec3 sonde_vessels_displace(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);
 // Whether the wall of a branch can move a point; cheaper than its state. @thread any
-bool sonde_vessel_reaches(const sonde_interior *interior, uint32_t which, double s_m,
+bool sonde_vessel_reaches(const sonde_interior *interior, uint32_t which, double along_m,
                           sonde_vec3 rest_m, double beyond_m);
 
 // Coordinates of a rest point in a lesion: unit ball. @thread any
@@ -198,6 +224,8 @@ void sonde_interior_next_window(sonde_interior *interior, const double footprint
 // Stages of a creation.
 sonde_status sonde_columns_create(sonde_interior *interior, sonde_error *error);
 sonde_status sonde_sections_create(sonde_interior *interior, sonde_error *error);
+// Where the branches' walls can move tissue, as wide as their lumina may be.
+void sonde_sections_mark(sonde_interior *interior);
 
 // Layer depths of the table again as the model gives them; windows have to be made again.
 void sonde_columns_refresh(sonde_interior *interior);
@@ -211,6 +239,10 @@ void sonde_vessel_shape(sonde_vessel_kind kind, const sonde_pathology *pathology
 double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot, bool in_fat);
 // Radius of the artery at its pressure relative to that at 95 mmHg.
 double sonde_artery_rest_scale(const sonde_pathology *pathology);
+// Blood's pressure (Pa) at position s of a limb over that at the groin, by posture: in a vein the
+// valves carry a part. 0 in a thigh, which ends above the knee. @thread any
+double sonde_hydrostatic_pressure(const sonde_interior *interior, sonde_posture posture,
+                                  sonde_vessel_kind kind, double s_m);
 // True where a thrombus lies.
 bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m);
 

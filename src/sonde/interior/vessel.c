@@ -116,31 +116,68 @@ static double pressure_on(const sonde_interior *in, const sonde_vessel_section *
   return base * effective(s.x + s.y + s.z, axial);
 }
 
+// What a vessel holds without and with clot under a pressure over the groin's, and its radius at
+// rest there over the model's, between muscles and in the fat where it lies so.
+typedef struct rest_size {
+  sonde_pathology held[2];
+  double scale[2][2];
+} rest_size;
+
+static rest_size rest_size_of(const sonde_interior *in, uint32_t which, double raised_pa) {
+  const bool artery = in->course[which].kind == SONDE_VESSEL_ARTERY;
+  rest_size r = {.held = {in->pathology[which], in->pathology[which]}};
+  for (int clot = 0; clot < 2; ++clot)
+    r.held[clot].venous_pressure_pa += raised_pa, r.held[clot].arterial_pressure_pa += raised_pa;
+  r.held[0].thrombus_fraction = 0;
+  const double filled = artery ? sonde_artery_rest_scale(&r.held[0]) : 1;
+  for (int fat = 0; fat < 2; ++fat) {
+    if (!in->course[which].lies[fat]) continue;
+    r.scale[0][fat] = artery ? filled : sonde_vein_rest_scale(&r.held[0], false, fat);
+    r.scale[1][fat] = artery || !(r.held[1].thrombus_fraction > 0)
+                          ? r.scale[0][fat]
+                          : sonde_vein_rest_scale(&r.held[1], true, fat);
+  }
+  return r;
+}
+
 // Areas follow the pressures with the time constant of emptying; directions follow the middles.
 static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
                           const sonde_interior_input *input) {
-  const bool artery = in->kind[which] == SONDE_VESSEL_ARTERY;
+  const bool artery = in->course[which].kind == SONDE_VESSEL_ARTERY;
   const sonde_pathology *all = &in->pathology[which];
-  const uint32_t count = in->section_count[which];
+  const uint32_t count = in->course[which].count;
   sonde_vessel_state *state = in->state[which];
-  // What it holds without and with clot, and its radius at rest over the model's, between muscles
-  // and in the fat.
-  sonde_pathology held[2] = {*all, *all};
-  held[0].thrombus_fraction = 0;
-  double scale[2][2], blend = 1;
-  const double filled = artery ? sonde_artery_rest_scale(all) : 1;
-  for (int fat = 0; fat < 2; ++fat) {
-    scale[0][fat] = artery ? filled : sonde_vein_rest_scale(&held[0], false, fat);
-    scale[1][fat] = artery || !(all->thrombus_fraction > 0) ? scale[0][fat]
-                                                            : sonde_vein_rest_scale(all, true, fat);
+  if (count == 0) return;
+  // Sizes at the lowest and the highest pressure along the vessel; between them they are taken to
+  // change evenly.
+  double low_pa = INFINITY, high_pa = -INFINITY, blend = 1;
+  for (uint32_t i = 0; i < count; ++i) {
+    double s = in->section[which][i].s_m;
+    double p = sonde_hydrostatic_pressure(in, input->posture, in->course[which].kind, s);
+    low_pa = fmin(low_pa, p), high_pa = fmax(high_pa, p);
   }
+  const rest_size low = rest_size_of(in, which, low_pa);
+  const rest_size high = high_pa > low_pa ? rest_size_of(in, which, high_pa) : low;
+  // Beyond the window's ends the solid is at rest.
+  const double from = in->solid ? in->live->grid.s[0] : -INFINITY,
+               to = in->solid ? in->live->grid.s[SONDE_WINDOW_S - 1] : INFINITY;
   if (!(input->dt_s < 0) && in->ready) blend = 1 - exp(-input->dt_s / relaxation_s);
   for (uint32_t i = 0; i < count; ++i) {
     const sonde_vessel_section *section = &in->section[which][i];
     sonde_vessel_state *v = &state[i];
     const bool clot = !artery && sonde_pathology_clot(all, section->rest_m.z);
+    const bool within = section->s_m >= from && section->s_m <= to;
     double half_short, half_long, goal = 1; // most sections, most of the time
-    v->outside_pa = pressure_on(in, section, l) + input->cuff_pa;
+    sonde_pathology held[2] = {low.held[0], low.held[1]};
+    double scale = low.scale[clot][section->in_fat];
+    if (high_pa > low_pa) {
+      double p =
+          sonde_hydrostatic_pressure(in, input->posture, in->course[which].kind, section->s_m) -
+          low_pa;
+      held[clot].venous_pressure_pa += p, held[clot].arterial_pressure_pa += p;
+      scale += p / (high_pa - low_pa) * (high.scale[clot][section->in_fat] - scale);
+    }
+    v->outside_pa = (within ? pressure_on(in, section, l) : 0) + input->cuff_pa;
     if (artery)
       goal = sonde_artery_area_ratio(&held[clot], v->outside_pa);
     else if (v->outside_pa > 0 || clot)
@@ -148,12 +185,14 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
     v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
     double engaged = fmax(fabs(1 - v->area_ratio) / sonde_engaged_loss, v->outside_pa / engaged_pa);
     v->coupling = section->coupling * clamp(engaged, 0, 1);
-    v->rest_radius_m = section->radius_m * scale[clot][section->in_fat];
-    sonde_vessel_shape(in->kind[which], &held[clot], clot, v->area_ratio, &half_short, &half_long);
+    v->rest_radius_m = section->radius_m * scale;
+    sonde_vessel_shape(in->course[which].kind, &held[clot], clot, v->area_ratio, &half_short,
+                       &half_long);
     v->half_short_m = half_short * v->rest_radius_m;
     v->half_long_m = half_long * v->rest_radius_m;
     v->rest_centre_m = section->rest_m;
-    v->centre_m = v_add(section->rest_m, sonde_interior_field(in, section->rest_m));
+    v->centre_m = section->rest_m;
+    if (within) v->centre_m = v_add(section->rest_m, sonde_interior_field(in, section->rest_m));
   }
   // A vessel leans away from its course at rest by so much at most: its cross-sections stay apart.
   for (uint32_t i = 0; i < count; ++i) {
@@ -266,12 +305,17 @@ static void probe_strain(const sonde_interior *in, const sonde_vessel_state *v, 
   least->smooth = fmin(least->smooth, safe_share * fmax(0, stretch) / fmax(size, 1e-9));
 }
 
+static bool may_meet(const sonde_vessel_section *section, uint32_t other) {
+  return other < 2 || (section->beside >> (other - 2) & 1) != 0;
+}
+
 // Where walls would fold a layer that is squeezed very thin around a section, or the tissue between
 // two of them, they give way to it, and less of the bends ends at them. True when walls gave way.
 static bool yield_to_folding(sonde_interior *in, uint32_t which, uint32_t i) {
   const sonde_vessel_state *v = &in->state[which][i];
   const sonde_vec3 side[2] = {v->flat_axis, v_cross(v->axis, v->flat_axis)};
-  const double s = in->section[which][i].s_m;
+  const sonde_vessel_section *section = &in->section[which][i];
+  const double s = section->s_m;
   strain least = {INFINITY, INFINITY};
   for (int ring = 0; ring < RINGS; ++ring)
     for (int k = 0; k < ring_sides[ring]; ++k) {
@@ -281,7 +325,9 @@ static bool yield_to_folding(sonde_interior *in, uint32_t which, uint32_t i) {
     }
   for (uint32_t other = 0; other < in->vessel_count; ++other) {
     sonde_vessel_state beside;
-    if (other == which || !sonde_vessel_at(in, other, s, &beside)) continue;
+    if (other == which || !may_meet(section, other)) continue;
+    const double along = sonde_vessel_along(in, other, v->rest_centre_m, s);
+    if (!sonde_vessel_at(in, other, along, &beside)) continue;
     sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
     double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
     if (!(gap > 0) || gap > most_gap_radii * (v->rest_radius_m + beside.rest_radius_m)) continue;
@@ -298,7 +344,9 @@ static bool yield_to_folding(sonde_interior *in, uint32_t which, uint32_t i) {
   for (uint32_t other = 0; other < in->vessel_count; ++other) {
     uint32_t at;
     double share;
-    if (!sonde_vessel_sections(in, other, s, &at, &share)) continue;
+    if (other != which && !may_meet(section, other)) continue;
+    const double along = sonde_vessel_along(in, other, v->rest_centre_m, s);
+    if (!sonde_vessel_sections(in, other, along, &at, &share)) continue;
     sonde_vessel_state *w = &in->state[other][at + (share > 0.5)];
     SONDE_ASSERT(w->rest_radius_m > 0 && w->tissue_short > 0 && w->tissue_long > 0);
     w->tissue_smoothing *= fmin(least.smooth, 1);
@@ -327,20 +375,22 @@ static void bound_by_neighbour(sonde_interior *in, uint32_t which, uint32_t i, u
 
 void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *input) {
   load l = measure_load(in->model, input);
-  const uint32_t *count = in->section_count;
+  const sonde_vessel_course *course = in->course;
   for (uint32_t which = 0; which < in->vessel_count; ++which) update_vessel(in, which, &l, input);
   for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < count[which]; ++i)
+    for (uint32_t i = 0; i < course[which].count; ++i)
       in->strained[which][i] = read_gradient(in, &in->state[which][i]);
   for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < count[which]; ++i) {
+    for (uint32_t i = 0; i < course[which].count; ++i) {
       // Two vessels side by side leave tissue between them: towards the other a lumen takes a share
       // of the gap at rest, as the tissue's gradient stretches it, and is as much larger across;
       // its area stays.
       sonde_vessel_state *v = &in->state[which][i], beside;
       for (uint32_t other = 0; other < in->vessel_count && v->coupling > 0; ++other) {
-        if (other == which || !sonde_vessel_at(in, other, in->section[which][i].s_m, &beside))
-          continue;
+        const sonde_vessel_section *section = &in->section[which][i];
+        if (other == which || !may_meet(section, other)) continue;
+        const double along = sonde_vessel_along(in, other, v->rest_centre_m, section->s_m);
+        if (!sonde_vessel_at(in, other, along, &beside)) continue;
         sonde_vec3 d = v_sub(beside.rest_centre_m, v->rest_centre_m);
         d = v_madd(d, -v_dot(d, v->axis), v->axis);
         double apart = v_norm(d), gap = apart - v->rest_radius_m - beside.rest_radius_m;
@@ -360,15 +410,15 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
   for (int pass = 0; pass < PASSES && changed; ++pass) {
     changed = false;
     for (uint32_t which = 0; which < in->vessel_count; ++which)
-      for (uint32_t i = 0; i < count[which]; ++i)
+      for (uint32_t i = 0; i < course[which].count; ++i)
         if (in->strained[which][i] && yield_to_folding(in, which, i)) changed = true;
     for (uint32_t which = 0; which < in->vessel_count; ++which) {
-      for (uint32_t i = 1; i < count[which]; ++i) bound_by_neighbour(in, which, i, i - 1);
-      for (uint32_t i = count[which]; i-- > 1;) bound_by_neighbour(in, which, i - 1, i);
+      for (uint32_t i = 1; i < course[which].count; ++i) bound_by_neighbour(in, which, i, i - 1);
+      for (uint32_t i = course[which].count; i-- > 1;) bound_by_neighbour(in, which, i - 1, i);
     }
   }
   for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < count[which]; ++i) {
+    for (uint32_t i = 0; i < course[which].count; ++i) {
       sonde_vessel_state *v = &in->state[which][i];
       double thin = sonde_least_lumen * v->rest_radius_m * v->tissue_short;
       v->half_short_m = fmax(v->half_short_m, thin);
@@ -395,7 +445,7 @@ void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input
 const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *in, int which,
                                                 uint32_t *count) {
   SONDE_ASSERT(in != NULL && which >= 0 && (uint32_t)which < in->vessel_count && count != NULL);
-  *count = in->section_count[which];
+  *count = in->course[which].count;
   return in->state[which];
 }
 
@@ -421,37 +471,38 @@ static sonde_vessel_state blend_states(const sonde_vessel_state *a, const sonde_
   return v;
 }
 
-bool sonde_vessel_sections(const sonde_interior *in, uint32_t which, double s, uint32_t *at,
+bool sonde_vessel_sections(const sonde_interior *in, uint32_t which, double along, uint32_t *at,
                            double *share) {
   SONDE_ASSERT(which < in->vessel_count && at != NULL && share != NULL);
-  uint32_t count = in->section_count[which];
+  uint32_t count = in->course[which].count;
   const sonde_vessel_section *section = in->section[which];
-  if (count < 2 || s < section[0].s_m || s > section[count - 1].s_m) return false;
-  double guess = (s - section[0].s_m) / (section[count - 1].s_m - section[0].s_m) * (count - 1);
+  if (count < 2 || along < section[0].along_m || along > section[count - 1].along_m) return false;
+  double length = section[count - 1].along_m - section[0].along_m;
+  double guess = (along - section[0].along_m) / length * (count - 1);
   uint32_t i = (uint32_t)fmin(floor(guess), count - 2);
-  while (i > 0 && section[i].s_m > s) --i;
-  while (i + 2 < count && section[i + 1].s_m < s) ++i;
-  double t = (s - section[i].s_m) / (section[i + 1].s_m - section[i].s_m);
+  while (i > 0 && section[i].along_m > along) --i;
+  while (i + 2 < count && section[i + 1].along_m < along) ++i;
+  double t = (along - section[i].along_m) / (section[i + 1].along_m - section[i].along_m);
   *at = i, *share = clamp(t, 0, 1);
   return true;
 }
 
-bool sonde_vessel_at(const sonde_interior *in, uint32_t which, double s,
+bool sonde_vessel_at(const sonde_interior *in, uint32_t which, double along,
                      sonde_vessel_state *state) {
   SONDE_ASSERT(which < in->vessel_count);
   uint32_t i;
   double t;
-  if (!sonde_vessel_sections(in, which, s, &i, &t)) return false;
+  if (!sonde_vessel_sections(in, which, along, &i, &t)) return false;
   *state = blend_states(&in->state[which][i], &in->state[which][i + 1], t);
   return true;
 }
 
-bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double s, sonde_vec3 rest,
+bool sonde_vessel_reaches(const sonde_interior *in, uint32_t which, double along, sonde_vec3 rest,
                           double beyond_m) {
   SONDE_ASSERT(which < in->vessel_count && beyond_m >= 0);
   uint32_t i;
   double t;
-  if (!sonde_vessel_sections(in, which, s, &i, &t)) return false;
+  if (!sonde_vessel_sections(in, which, along, &i, &t)) return false;
   const sonde_vessel_state *a = &in->state[which][i], *b = a + 1;
   sonde_vec3 d = v_sub(rest, v_lerp(a->rest_centre_m, b->rest_centre_m, t));
   double slant = fabs(v_dot(d, a->axis)); // lies along the vessel, not beside it
@@ -505,7 +556,7 @@ bool sonde_interior_vessel_at_plane(const sonde_interior *in, int which, sonde_p
   const sonde_vessel_state *v = in->state[which];
   double nearest = plane_reach_m;
   bool found = false;
-  for (uint32_t i = 0; i + 1 < in->section_count[which]; ++i) {
+  for (uint32_t i = 0; i + 1 < in->course[which].count; ++i) {
     sonde_vec3 a = pose_apply_inverse(probe, v[i].centre_m);
     sonde_vec3 b = pose_apply_inverse(probe, v[i + 1].centre_m);
     if ((a.y > 0) == (b.y > 0)) continue;

@@ -312,10 +312,12 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   // Sections of a vessel are closer than elements: each of these is evaluated once per update.
   if (pressed) memset(w->felt, 0, w->solid.hex_count * sizeof *w->felt);
   for (uint32_t which = 0; which < in->vessel_count && pressed; ++which)
-    for (uint32_t n = 0; n < in->section_count[which]; ++n) {
+    for (uint32_t n = 0; n < in->course[which].count; ++n) {
       uint32_t element[27];
       double share[27];
       sonde_column_point at;
+      const double s = in->section[which][n].s_m;
+      if (s < w->grid.s[0] || s > w->grid.s[NS - 1]) continue;
       (void)sonde_interior_locate(in, in->section[which][n].rest_m, &at);
       if (!list_elements(w, at.theta, at.s, at.r, element, share)) continue;
       for (uint32_t k = 0; k < 27; ++k) {
