@@ -3,6 +3,7 @@
 #include "../sanitized.h"
 #include "anatomy/shape.h"
 #include "tissue/anatomy.h"
+#include "tissue/layer_springs.h"
 
 #include <inttypes.h>
 
@@ -338,17 +339,17 @@ static void compartments_lie_around_the_femur(void **state) {
 static void springs_follow_the_layers(void **state) {
   (void)state;
   double k0, xm, k1, xm1;
-  sonde_thigh_springs(0.01, 0.05, 1, &k0, &xm);
-  sonde_thigh_springs(0.01, 0.05, 2, &k1, &xm1);
+  sonde_layer_springs(0.01, 0.05, 0.02, 1, &k0, &xm);
+  sonde_layer_springs(0.01, 0.05, 0.02, 2, &k1, &xm1);
   assert_near(k1, 2 * k0, 1e-9 * k0);
   assert_near(xm1, xm, 1e-15);
-  sonde_thigh_springs(0.02, 0.05, 1, &k1, &xm1);
+  sonde_layer_springs(0.02, 0.05, 0.02, 1, &k1, &xm1);
   assert_true(k1 < k0 && xm1 > xm); // more fat: softer, deeper
-  sonde_thigh_springs(0.02, 0.10, 1, &k1, &xm1);
+  sonde_layer_springs(0.02, 0.10, 0.02, 1, &k1, &xm1);
   double base, unused;
-  sonde_thigh_springs(0.01, 0.05, 1, &base, &unused);
+  sonde_layer_springs(0.01, 0.05, 0.02, 1, &base, &unused);
   assert_near(k1, 0.5 * base, 1e-9 * base); // twice the layers, half the stiffness
-  sonde_thigh_springs(0, 0, 1, &k1, &xm1);
+  sonde_layer_springs(0, 0, 0.02, 1, &k1, &xm1);
   assert_true(isfinite(k1) && xm1 > 0.01); // at the cut ends the bone comes to the skin
 }
 
@@ -365,8 +366,8 @@ static void springs_match_the_bundled_thigh(void **state) {
           v_distance(model->surface.vertices[at], site->position_m))
         at = i;
     double k0, xm;
-    sonde_thigh_springs(model->muscle_depth_m[at] - model->fat_depth_m[at],
-                        model->bone_depth_m[at] - model->muscle_depth_m[at], 1, &k0, &xm);
+    sonde_layer_springs(model->muscle_depth_m[at] - model->fat_depth_m[at],
+                        model->bone_depth_m[at] - model->muscle_depth_m[at], 0.02, 1, &k0, &xm);
     sum_k += pow(log(k0 / site->k0_n_m3), 2) / model->site_count;
     sum_x += pow(log(xm / site->xm_m), 2) / model->site_count;
   }

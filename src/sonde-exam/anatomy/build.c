@@ -1,26 +1,14 @@
 // From a shape to a model.
 #include "anatomy/shape.h"
 
+#include "tissue/layer_springs.h"
+
 #include <string.h>
 
 enum { SITES = SONDE_THIGH_COLUMNS * SONDE_THIGH_ROWS, LEVELS = 32 };
+// At the cut ends the bone comes to the skin.
+static const double LEAST_TISSUE_M = 0.02;
 static const double SITE_STEP_M = 0.015, FINE_REACH_M = 0.005; // between columns; round footprints
-
-// Springs of the layers in series and an asymptote that is a share of the tissue's thickness:
-// least squares over the 64 sites of the bundled thigh (docs/anatomy_theory.md).
-static const double FAT_COMPLIANCE = 1.688e-4, MUSCLE_COMPLIANCE = 4.963e-5; // m^2/N
-static const double ASYMPTOTE_SHARE = 0.6726;
-static const double LEAST_FAT_M = 0.002, LEAST_TISSUE_M = 0.02;
-static const double SHEAR_N_M = 15.74, SHEAR_LIMIT = 1.104;
-
-void sonde_thigh_springs(double fat_m, double muscle_m, double stiffness, double *k0_n_m3,
-                         double *xm_m) {
-  SONDE_ASSERT(stiffness > 0);
-  double fat = fmax(fat_m, LEAST_FAT_M), muscle = fmax(muscle_m, LEAST_TISSUE_M - fat);
-  muscle = fmax(muscle, 0);
-  *k0_n_m3 = stiffness / (FAT_COMPLIANCE * fat + MUSCLE_COMPLIANCE * muscle);
-  *xm_m = ASYMPTOTE_SHARE * (fat + muscle);
-}
 
 sonde_thigh_def sonde_thigh_def_default(void) {
   return (sonde_thigh_def){"thigh", "Generated, not measured", 0.006, 0.003};
@@ -133,7 +121,8 @@ static sonde_status make(const sonde_thigh *thigh, const sonde_thigh_shape *shap
                       .v = v_cross(n, u)};
     double fat = sonde_shape_fat(shape, s->position_m);
     double bone = sonde_tube_outside(&shape->femur, s->position_m);
-    sonde_thigh_springs(fat, bone - fat - thigh->skin_m, thigh->stiffness, &s->k0_n_m3, &s->xm_m);
+    sonde_layer_springs(fat, bone - fat - thigh->skin_m, LEAST_TISSUE_M, thigh->stiffness,
+                        &s->k0_n_m3, &s->xm_m);
   }
   sonde_model_def built = sonde_model_def_default();
   built.name = def->name;
@@ -144,14 +133,7 @@ static sonde_status make(const sonde_thigh *thigh, const sonde_thigh_shape *shap
   built.site_count = SITES;
   built.fine_edge_m = def->fine_edge_m;
   built.fine_reach_m = FINE_REACH_M;
-  built.law = sonde_surface_law_default();
-  built.law.edge_stiffness_n_m = 0;
-  built.law.inplane_stiffness_n_m = SONDE_SKIN_INPLANE_N_M * thigh->stiffness;
-  built.law.tangential_stiffness_n_m3 = SONDE_SKIN_TANGENTIAL_N_M3 * thigh->stiffness;
-  built.law.shear_stiffness_n_m = SHEAR_N_M * thigh->stiffness;
-  built.law.shear_limit = SHEAR_LIMIT;
-  built.law.normal_exponent = 2;
-  built.law.normal_damping_s = thigh->damping_s;
+  built.law = sonde_layered_law(thigh->stiffness, thigh->damping_s);
   status = sonde_model_build(&built, model, error);
   if (status) return status;
   // Layers and springs of every node.
@@ -160,8 +142,8 @@ static sonde_status make(const sonde_thigh *thigh, const sonde_thigh_shape *shap
     double bone = m->bone_depth_m[i], fat = sonde_shape_fat(shape, m->surface.vertices[i]);
     m->fat_depth_m[i] = fmin(whole_nm(thigh->skin_m), 0.4 * bone);
     m->muscle_depth_m[i] = clamp(whole_nm(thigh->skin_m + fat), m->fat_depth_m[i], 0.9 * bone);
-    sonde_thigh_springs(m->muscle_depth_m[i] - m->fat_depth_m[i], bone - m->muscle_depth_m[i],
-                        thigh->stiffness, &m->k0_n_m3[i], &m->xm_m[i]);
+    sonde_layer_springs(m->muscle_depth_m[i] - m->fat_depth_m[i], bone - m->muscle_depth_m[i],
+                        LEAST_TISSUE_M, thigh->stiffness, &m->k0_n_m3[i], &m->xm_m[i]);
   }
   return name_parts(thigh, shape, course, m, error);
 }

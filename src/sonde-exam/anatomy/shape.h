@@ -23,11 +23,6 @@ struct sonde_thigh_shape {
   double fat_m[SONDE_TUBE_ROWS][SONDE_TUBE_COLUMNS]; // thickness along the skin's normal
 };
 
-// Whole nanometres: results of the maths library that differ in the last bit become equal.
-static inline double whole_nm(double m) { return nearbyint(m * 1e9) / 1e9; }
-static inline sonde_vec3 v_whole_nm(sonde_vec3 p) {
-  return vec3(whole_nm(p.x), whole_nm(p.y), whole_nm(p.z));
-}
 // 0 below 0, 1 above 1, smooth in between.
 static inline double smooth_step(double t) {
   t = clamp(t, 0, 1);
@@ -66,9 +61,6 @@ double sonde_shape_least_muscle(const sonde_thigh_shape *shape, const sonde_thig
 
 // Checks every range of the parameters. @return ARGUMENT naming parameter and range
 sonde_status sonde_thigh_check(const sonde_thigh *thigh, sonde_error *error);
-// Stiffness (N/m^3) and asymptote (m) of the springs above layers of that thickness.
-void sonde_thigh_springs(double fat_m, double muscle_m, double stiffness, double *k0_n_m3,
-                         double *xm_m);
 
 // The vessels of a thigh as they are placed.
 typedef struct sonde_course {

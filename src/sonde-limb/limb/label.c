@@ -1,5 +1,6 @@
 // Labels, distances and fibres at points; the mirror of a left limb.
 #include "limb/bones.h"
+#include "limb/label.h"
 #include "limb/muscles.h"
 #include "limb/vessels.h"
 
@@ -130,10 +131,8 @@ const char *sonde_limb_name(const sonde_limb *limb, sonde_limb_label label) {
   return name && *name ? name : TISSUES[label.tissue];
 }
 
-sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 point) {
-  SONDE_ASSERT(limb && limb->bones);
-  sonde_vec3 p = to_right(limb, point);
-  const double xyz[3] = {p.x, p.y, p.z}, top = limb_z(limb, LIMB_TOP), foot = limb_z(limb, 2);
+limb_layers limb_layers_at(const sonde_limb *limb, sonde_vec3 p) {
+  const double top = limb_z(limb, LIMB_TOP), foot = limb_z(limb, 2);
   double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2);
   sonde_vec3 c = limb_centre(limb, level);
   double x = p.x - c.x, y = p.y - c.y, r = sqrt(x * x + y * y), a = atan2(x, y);
@@ -150,10 +149,19 @@ sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 poin
        (up.x - down.x) * sin(a) + (up.y - down.y) * cos(a)) /
       (up.z - down.z);
   double slope = sqrt(1 + around * around + along * along), beyond = fmax(p.z - top, foot - p.z);
-  return (sonde_limb_distances){
-      fmax((r - skin) / slope, beyond), fmax((r - fascia) / slope, beyond),
-      limb_bone_distance(limb, xyz, NULL),
-      limb->vessels ? limb_vessels_at(limb->vessels, xyz).distance_m : INFINITY};
+  double deep = fascia + limb_deep_fat(limb, level, a);
+  return (limb_layers){fmax((r - skin) / slope, beyond), fmax((r - deep) / slope, beyond),
+                       fmax((r - fascia) / slope, beyond)};
+}
+
+sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 point) {
+  SONDE_ASSERT(limb && limb->bones);
+  sonde_vec3 p = to_right(limb, point);
+  const double xyz[3] = {p.x, p.y, p.z};
+  limb_layers layers = limb_layers_at(limb, p);
+  return (sonde_limb_distances){layers.skin, layers.fascia, limb_bone_distance(limb, xyz, NULL),
+                                limb->vessels ? limb_vessels_at(limb->vessels, xyz).distance_m
+                                              : INFINITY};
 }
 
 bool sonde_limb_fibre(const sonde_limb *limb, sonde_vec3 point, sonde_vec3 *direction) {

@@ -172,4 +172,9 @@ static inline double clamp(double x, double low, double high) {
   return x < low ? low : (x > high ? high : x);
 }
 
+// Whole nanometres: results of the maths library that differ in the last bit become equal.
+static inline double whole_nm(double m) { return nearbyint(m * 1e9) / 1e9; }
+static inline sonde_vec3 v_whole_nm(sonde_vec3 p) {
+  return vec3(whole_nm(p.x), whole_nm(p.y), whole_nm(p.z));
+}
 #endif

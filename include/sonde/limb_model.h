@@ -1,0 +1,48 @@
+/**
+ * @file limb_model.h
+ * A limb as a model that can be pressed and imaged: skin, bones, layers, springs, vessels,
+ * stations, and the limb itself as the model's tissue map. docs/limb_model.md.
+ *
+ * Frame of the model, as of every model of a leg: x and y as in limb.h, z downwards, 0 at the
+ * limb's upper end.
+ */
+#ifndef SONDE_LIMB_MODEL_H
+#define SONDE_LIMB_MODEL_H
+
+#include "sonde/limb_vessels.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** How the model of a limb is made. */
+typedef struct sonde_limb_model_def {
+  const char *name, *provenance;
+  double edge_m;      /**< of the skin; default 6 mm */
+  double fine_edge_m; /**< along the main vein and at the stations; default 3 mm */
+  double stiffness;   /**< of the soft tissue, 0.2 to 5; 1: that of the bundled thigh */
+  double damping_s;   /**< time of the normal dampers; 20 ms */
+} sonde_limb_model_def;
+SONDE_API sonde_limb_model_def sonde_limb_model_def_default(void); /**< @thread any */
+
+/**
+ * Makes the limb of a drawn body and its model. Vein: external iliac to popliteal; artery likewise;
+ * all other vessels are branches, with '_' for ' ' in their names. Landmarks and sites 0 to 14 are
+ * the stations; further sites stand along the main vein. Springs follow from the layers below each
+ * node, tendon being stiffer than muscle.
+ * @param[out] model owned by the caller; owns the limb
+ * @return ARGUMENT for a body without room for muscle or a def out of range; MESH
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_limb_model(const sonde_limb_body *body,
+                                        const sonde_limb_model_def *def, sonde_model **model,
+                                        sonde_error *error);
+/** The limb of such a model, NULL of any other; the model's. @thread any */
+SONDE_API const sonde_limb *sonde_limb_of(const sonde_model *model);
+/** A point of the limb's frame in the model's, or the other way. @thread any */
+SONDE_API sonde_vec3 sonde_limb_to_model(const sonde_limb *limb, sonde_vec3 point_m);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,349 @@
+// A limb as a model: meshes in the model's frame, layers and springs, vessels, stations.
+#include "sonde/limb_model.h"
+
+#include "limb/bones.h"
+#include "limb/map.h"
+#include "tissue/layer_springs.h"
+
+#include <string.h>
+
+enum { COURSE_SITES = 24, SITES = SONDE_LIMB_STATIONS + COURSE_SITES };
+static const double FINE_REACH_M = 0.004, BONE_EDGE_M = 0.003, LEAST_TISSUE_M = 0.004;
+// A tendon is stiffer than muscle: it counts as so much of its thickness.
+static const double TENDON_SHARE = 0.2;
+enum { DEPTHS = 12 };
+
+sonde_limb_model_def sonde_limb_model_def_default(void) {
+  return (sonde_limb_model_def){"limb", "Synthetic limb, not measured", 0.006, 0.003, 1, 0.02};
+}
+
+sonde_vec3 sonde_limb_to_model(const sonde_limb *limb, sonde_vec3 p) {
+  SONDE_ASSERT(limb);
+  return vec3(p.x, p.y, limb_z(limb, LIMB_TOP) - p.z);
+}
+
+// The same for directions.
+static sonde_vec3 turned(sonde_vec3 v) { return vec3(v.x, v.y, -v.z); }
+
+// Appends a mesh in the model's frame: its z runs the other way, so that its faces turn round.
+static sonde_status append(const sonde_limb *limb, const sonde_mesh *from, sonde_mesh *to,
+                           sonde_error *error) {
+  sonde_mesh all;
+  const uint32_t v = to->vertex_count, f = to->face_count;
+  sonde_status status =
+      sonde_mesh_create(&all, v + from->vertex_count, f + from->face_count, error);
+  if (status) return status;
+  if (v) memcpy(all.vertices, to->vertices, v * sizeof *all.vertices);
+  if (f) memcpy(all.faces, to->faces, f * sizeof *all.faces);
+  for (uint32_t i = 0; i < from->vertex_count; ++i)
+    all.vertices[v + i] = v_whole_nm(sonde_limb_to_model(limb, from->vertices[i]));
+  for (uint32_t i = 0; i < from->face_count; ++i) {
+    const uint32_t *face = from->faces[i];
+    all.faces[f + i][0] = v + face[0];
+    all.faces[f + i][1] = v + face[2], all.faces[f + i][2] = v + face[1];
+  }
+  sonde_mesh_clear(to);
+  *to = all;
+  return SONDE_OK;
+}
+
+// Skin and all bones.
+static sonde_status make_meshes(const sonde_limb *limb, double edge_m, sonde_mesh *skin,
+                                sonde_mesh *bones, sonde_error *error) {
+  sonde_mesh part = {0};
+  sonde_status status = sonde_limb_skin(limb, edge_m, &part, error);
+  if (!status) status = append(limb, &part, skin, error);
+  sonde_mesh_clear(&part);
+  for (int bone = 0; bone < SONDE_LIMB_BONES && !status; ++bone) {
+    status = sonde_limb_bone_mesh(limb, (sonde_limb_bone)bone, BONE_EDGE_M, &part, error);
+    if (!status) status = append(limb, &part, bones, error);
+    sonde_mesh_clear(&part);
+  }
+  return status;
+}
+
+// Middles of the bones that carry the body: hip joint, neck, shaft, knee, tibia.
+static sonde_status lay_axis(const sonde_limb *limb, sonde_model *model, sonde_error *error) {
+  enum { POINTS = 111, PASSES = 3 };
+  model->bone_axis_m = SONDE_NEW(sonde_vec3, POINTS);
+  if (!model->bone_axis_m) return sonde_fail_memory(error);
+  model->bone_axis_count = POINTS;
+  const double neck_end = 0.12, mirror = limb->body.side == SONDE_LIMB_LEFT ? -1 : 1;
+  sonde_vec3 *p = model->bone_axis_m;
+  for (uint32_t k = 0; k < POINTS; ++k) {
+    double level = LIMB_TOP + k * (2 - LIMB_TOP) / (POINTS - 1), z = limb_z(limb, level);
+    double t = clamp(level / neck_end, 0, 1), down = clamp((level - 0.94) / 0.12, 0, 1);
+    sonde_vec3 shaft = v_scale(limb_shaft_axis(&limb->body, fmax(level, 0)), t * t * (3 - 2 * t));
+    sonde_vec3 shin = limb_tibia_axis(&limb->body, fmax(level, 1));
+    sonde_vec3 at = v_lerp(shaft, shin, down * down * (3 - 2 * down));
+    p[k] = vec3(mirror * at.x, at.y, z);
+  }
+  for (int pass = 0; pass < PASSES; ++pass) {
+    sonde_vec3 before = p[0];
+    for (uint32_t k = 1; k + 1 < POINTS; ++k) {
+      sonde_vec3 now = p[k], mean = v_lerp(before, p[k + 1], 0.5);
+      p[k] = vec3(0.5 * (now.x + mean.x), 0.5 * (now.y + mean.y), now.z);
+      before = now;
+    }
+  }
+  for (uint32_t k = 0; k < POINTS; ++k) p[k] = v_whole_nm(sonde_limb_to_model(limb, p[k]));
+  return SONDE_OK;
+}
+
+// Layers and springs of every node, from the tissue on the way to the nearest bone.
+static void lay_springs(const sonde_limb *limb, const sonde_limb_model_def *def,
+                        sonde_model *model) {
+  const sonde_tissue_map *map = model->map;
+  for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
+    sonde_vec3 node = model->surface.vertices[i], in = v_neg(model->normal[i]);
+    sonde_tissue_depths depth;
+    map->depths(map->self, node, &depth);
+    double bone = model->bone_depth_m[i], skin = fmin(whole_nm(limb->body.skin_m), 0.4 * bone);
+    double muscle = clamp(whole_nm(depth.fascia_m), skin, 0.9 * bone), tendon = 0;
+    model->fat_depth_m[i] = skin, model->muscle_depth_m[i] = muscle;
+    for (int k = 0; k < DEPTHS; ++k) {
+      double at = muscle + (bone - muscle) * (k + 0.5) / DEPTHS;
+      if (map->tissue(map->self, v_madd(node, at, in)) == SONDE_TISSUE_TENDON)
+        tendon += 1.0 / DEPTHS;
+    }
+    double thick = (bone - muscle) * (1 - (1 - TENDON_SHARE) * tendon);
+    sonde_layer_springs(muscle - skin, whole_nm(thick), LEAST_TISSUE_M, def->stiffness,
+                        &model->k0_n_m3[i], &model->xm_m[i]);
+  }
+}
+
+/* ---- vessels ------------------------------------------------------------------------------ */
+
+// Branches that follow each other, as one line.
+typedef struct chain {
+  uint32_t count, branch[5];
+  double length_m;
+} chain;
+
+static chain find_chain(const sonde_limb *limb, const char *const *names) {
+  chain c = {0};
+  for (; *names; ++names) {
+    uint32_t branch = sonde_limb_vessel_find(limb, *names);
+    if (branch == SONDE_LIMB_NO_VESSEL) continue;
+    c.branch[c.count++] = branch;
+    c.length_m += sonde_limb_vessel_get(limb, branch).length_m;
+  }
+  return c;
+}
+
+static sonde_limb_vessel_point chain_place(const sonde_limb *limb, const chain *c, double arc) {
+  uint32_t k = 0;
+  for (; k + 1 < c->count; ++k) {
+    double length = sonde_limb_vessel_get(limb, c->branch[k]).length_m;
+    if (arc <= length) break;
+    arc -= length;
+  }
+  return sonde_limb_vessel_place(limb, c->branch[k], arc);
+}
+
+// Points at equal arcs; a line that is to run down the leg leaves out those that do not.
+static void lay_line(const sonde_limb *limb, const chain *c, bool down, sonde_vessel *line) {
+  const double step_m = 0.004, least_down_m = 0.002;
+  uint32_t most = (uint32_t)clamp(ceil(c->length_m / step_m) + 1, 2, SONDE_VESSEL_POINTS);
+  line->count = 0;
+  for (uint32_t k = 0; k < most; ++k) {
+    sonde_limb_vessel_point at = chain_place(limb, c, c->length_m * k / (most - 1));
+    sonde_vec3 centre = v_whole_nm(sonde_limb_to_model(limb, at.centre_m));
+    if (down && line->count && centre.z < line->point[line->count - 1].centre_m.z + least_down_m)
+      continue;
+    double depth = fmax(-sonde_limb_distance(limb, at.centre_m).skin, at.radius_m);
+    line->point[line->count++] =
+        (sonde_vessel_point){centre, whole_nm(at.radius_m), whole_nm(depth)};
+  }
+}
+
+static const char *const VEINS[] = {"external iliac vein", "common femoral vein", "femoral vein",
+                                    "popliteal vein", NULL};
+static const char *const ARTERIES[] = {"external iliac artery", "common femoral artery",
+                                       "superficial femoral artery", "popliteal artery", NULL};
+
+// A name as files have it: "femoral vein, middle" -> "femoral_vein_middle". Saphenous veins go
+// without their last word, as those of a thigh, and so do names that are too long.
+static void name_of(const char *from, char to[32]) {
+  enum { MOST = 31 };
+  char all[64];
+  size_t count = 0;
+  for (; *from && count + 1 < sizeof all; ++from)
+    if (*from != ',') all[count++] = *from == ' ' ? '_' : *from;
+  all[count] = '\0';
+  char *last = strstr(all, "saphenous_vein");
+  if (last && strlen(last) == strlen("saphenous_vein")) last[strlen("saphenous")] = '\0';
+  while (strlen(all) > MOST && (last = strrchr(all, '_')) != NULL) *last = '\0';
+  snprintf(to, MOST + 1, "%.31s", all);
+}
+
+// Vessels beside the main ones, in the order of the graph while there is room.
+static void lay_branches(const sonde_limb *limb, const chain *veins, const chain *arteries,
+                         sonde_thigh_anatomy *a) {
+  const uint32_t count = sonde_limb_vessel_count(limb);
+  for (uint32_t v = 0; v < count && a->branch_count < SONDE_BRANCHES; ++v) {
+    bool main = false;
+    for (uint32_t k = 0; k < veins->count; ++k) main |= veins->branch[k] == v;
+    for (uint32_t k = 0; k < arteries->count; ++k) main |= arteries->branch[k] == v;
+    if (main) continue;
+    sonde_limb_vessel vessel = sonde_limb_vessel_get(limb, v);
+    chain c = {1, {v}, vessel.length_m};
+    sonde_branch *branch = &a->branch[a->branch_count++];
+    *branch = (sonde_branch){.kind = vessel.kind == SONDE_LIMB_ARTERY ? SONDE_VESSEL_ARTERY
+                                                                      : SONDE_VESSEL_VEIN};
+    name_of(vessel.name, branch->name);
+    lay_line(limb, &c, false, &branch->line);
+  }
+}
+
+/* ---- stations ----------------------------------------------------------------------------- */
+
+static sonde_site site_at(const sonde_limb *limb, uint32_t id, sonde_vec3 skin, sonde_vec3 normal) {
+  sonde_vec3 n = turned(normal), u = v_unit(v_cross(vec3(0, 0, 1), n), vec3(1, 0, 0));
+  return (sonde_site){.id = id,
+                      .position_m = v_whole_nm(sonde_limb_to_model(limb, skin)),
+                      .normal = n,
+                      .u = u,
+                      .v = v_cross(n, u)};
+}
+
+// Sites at the stations and along the main vein, from the side from which the stations before and
+// behind look at it.
+static void lay_sites(const sonde_limb *limb, const chain *veins,
+                      const sonde_limb_station station[SONDE_LIMB_STATIONS],
+                      sonde_site site[SITES]) {
+  enum { LAST = 9 }; // station at the popliteal vein's end
+  double level[SONDE_LIMB_STATIONS], angle[SONDE_LIMB_STATIONS], f;
+  for (uint32_t k = 0; k < SONDE_LIMB_STATIONS; ++k) {
+    site[k] = site_at(limb, k, station[k].skin_m, station[k].normal);
+    sonde_limb_polar(limb, station[k].skin_m, &level[k], &angle[k], &f);
+  }
+  for (uint32_t k = 0; k < COURSE_SITES; ++k) {
+    double arc = veins->length_m * (k + 1.0) / (COURSE_SITES + 1), at, unused;
+    sonde_limb_polar(limb, chain_place(limb, veins, arc).centre_m, &at, &unused, &f);
+    uint32_t i = 0;
+    while (i + 1 < LAST && level[i + 1] < at) ++i;
+    double t = clamp((at - level[i]) / (level[i + 1] - level[i]), 0, 1);
+    double side = angle[i] + t * remainder(angle[i + 1] - angle[i], 2 * SONDE_PI);
+    sonde_vec3 p[3];
+    const double shift[3][2] = {{0, 0}, {0.01, 0}, {0, 0.02}};
+    for (int j = 0; j < 3; ++j) {
+      double l = at + shift[j][0], a = side + shift[j][1];
+      double out = limb_skin_radius(limb, l, a) / limb_fascia_radius(limb, l, a);
+      p[j] = sonde_limb_point(limb, l, a, out);
+    }
+    sonde_vec3 n = v_unit(v_cross(v_sub(p[1], p[0]), v_sub(p[2], p[0])), vec3(0, 1, 0));
+    sonde_vec3 out = v_sub(p[0], sonde_limb_point(limb, at, side, 0));
+    site[SONDE_LIMB_STATIONS + k] =
+        site_at(limb, SONDE_LIMB_STATIONS + k, p[0], v_dot(n, out) < 0 ? v_neg(n) : n);
+  }
+}
+
+// Stations as landmarks, and stretches of the main vein.
+static void name_parts(const sonde_limb *limb,
+                       const sonde_limb_station station[SONDE_LIMB_STATIONS], sonde_model *model) {
+  sonde_thigh_anatomy *a = model->anatomy;
+  _Static_assert((int)SONDE_LIMB_STATIONS <= (int)SONDE_LANDMARKS, "a landmark for each station");
+  for (uint32_t k = 0; k < SONDE_LIMB_STATIONS; ++k) {
+    sonde_landmark *mark = &a->landmark[a->landmark_count++];
+    *mark = (sonde_landmark){.skin_m = model->sites[k].position_m,
+                             .normal = model->sites[k].normal,
+                             .vein_m = sonde_limb_to_model(limb, station[k].target_m),
+                             .site = k};
+    name_of(station[k].name, mark->name);
+  }
+  uint32_t common = sonde_limb_vessel_find(limb, "common femoral vein"),
+           popliteal = sonde_limb_vessel_find(limb, "popliteal vein");
+  const sonde_vessel *vein = &model->vein;
+  double ligament = sonde_limb_to_model(limb, sonde_limb_vessel_place(limb, common, 0).centre_m).z;
+  double meet =
+      sonde_limb_to_model(
+          limb, sonde_limb_vessel_place(limb, common, sonde_limb_vessel_get(limb, common).length_m)
+                    .centre_m)
+          .z;
+  double hiatus = sonde_limb_to_model(limb, sonde_limb_vessel_place(limb, popliteal, 0).centre_m).z;
+  double third = (hiatus - meet) / 3, end = vein->point[vein->count - 1].centre_m.z;
+  const struct {
+    const char *name;
+    double from, to;
+  } segment[] = {{"external_iliac", vein->point[0].centre_m.z, ligament},
+                 {"common_femoral", ligament, meet},
+                 {"femoral_proximal", meet, meet + third},
+                 {"femoral_mid", meet + third, meet + 2 * third},
+                 {"femoral_distal", meet + 2 * third, hiatus},
+                 {"popliteal", hiatus, end}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(segment); ++k) {
+    sonde_segment *to = &a->segment[a->segment_count++];
+    to->from_m = whole_nm(segment[k].from), to->to_m = whole_nm(segment[k].to);
+    snprintf(to->name, sizeof to->name, "%s", segment[k].name);
+  }
+  a->fascia_medial_m = 0.0008, a->fascia_lateral_m = 0.0011;
+}
+
+/* ---- the model ---------------------------------------------------------------------------- */
+
+static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sonde_mesh *skin,
+                         sonde_mesh *bones, sonde_model **out, sonde_error *error) {
+  sonde_status status = make_meshes(limb, def->edge_m, skin, bones, error);
+  if (status) return status;
+  sonde_limb_station station[SONDE_LIMB_STATIONS];
+  sonde_site site[SITES];
+  chain veins = find_chain(limb, VEINS), arteries = find_chain(limb, ARTERIES);
+  sonde_limb_stations(limb, station);
+  lay_sites(limb, &veins, station, site);
+  sonde_model_def built = sonde_model_def_default();
+  built.name = def->name, built.provenance = def->provenance;
+  built.skin = skin, built.femur = bones;
+  built.sites = site, built.site_count = SITES;
+  built.fine_edge_m = def->fine_edge_m, built.fine_reach_m = FINE_REACH_M;
+  built.law = sonde_layered_law(def->stiffness, def->damping_s);
+  status = sonde_model_build(&built, out, error);
+  if (status) return status;
+  sonde_model *model = *out;
+  model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
+  if (!model->anatomy) return sonde_fail_memory(error);
+  status = limb_map_create(limb, &model->map, error);
+  if (!status) status = lay_axis(limb, model, error);
+  if (status) return status;
+  lay_springs(limb, def, model);
+  // Sites have the springs of the nodes beside them.
+  for (uint32_t k = 0; k < SITES; ++k) {
+    uint32_t at =
+        v_nearest(model->surface.vertices, model->surface.vertex_count, model->sites[k].position_m);
+    model->sites[k].k0_n_m3 = model->k0_n_m3[at], model->sites[k].xm_m = model->xm_m[at];
+  }
+  lay_line(limb, &veins, true, &model->vein);
+  lay_line(limb, &arteries, true, &model->artery);
+  lay_branches(limb, &veins, &arteries, model->anatomy);
+  name_parts(limb, station, model);
+  return SONDE_OK;
+}
+
+sonde_status sonde_limb_model(const sonde_limb_body *body, const sonde_limb_model_def *def,
+                              sonde_model **model, sonde_error *error) {
+  SONDE_ASSERT(body && def && model);
+  *model = NULL;
+  if (!(def->edge_m >= 0.003 && def->edge_m <= 0.02))
+    return sonde_fail(error, SONDE_ARGUMENT, "edge_m is %g, expected 0.003 to 0.02", def->edge_m);
+  if (!(def->stiffness >= 0.2 && def->stiffness <= 5))
+    return sonde_fail(error, SONDE_ARGUMENT, "stiffness is %g, expected 0.2 to 5", def->stiffness);
+  sonde_limb *limb;
+  sonde_mesh skin = {0}, bones = {0};
+  sonde_status status = sonde_limb_create(body, &limb, error);
+  if (status) return status;
+  status = make(limb, def, &skin, &bones, model, error);
+  sonde_mesh_clear(&skin);
+  sonde_mesh_clear(&bones);
+  if (status) {
+    bool owned = *model && (*model)->map; // the limb is the map's
+    sonde_model_destroy(*model);
+    if (!owned) sonde_limb_destroy(limb);
+    *model = NULL;
+  }
+  return status;
+}
+
+const sonde_limb *sonde_limb_of(const sonde_model *model) {
+  SONDE_ASSERT(model);
+  return limb_map_is(model->map) ? model->map->self : NULL;
+}
