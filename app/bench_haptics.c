@@ -145,7 +145,7 @@ int bench_haptics(const char *model_path, const char *device, double seconds, bo
   sonde_error error = {0};
   sonde_model *model = NULL;
   sonde_probe probe = {0};
-  sonde_status status = sonde_model_load(model_path, &model, &error);
+  sonde_status status = sonde_limb_model_load(model_path, &model, &error);
   if (!status) status = sonde_probe_create("linear", &probe, &error);
   b.capacity = (size_t)(seconds * 1e3) + 1000;
   double *times = calloc(4 * b.capacity, sizeof *times);

@@ -323,7 +323,7 @@ static int run_bench(void *from) {
   sonde_model *model = NULL;
   double error_ratio = NAN;
   sonde_status status = is_ellipsoid(o) ? bench_ellipsoid_build(&o->ellipsoid, &model, &error)
-                                        : sonde_model_load(o->model, &model, &error);
+                                        : sonde_limb_model_load(o->model, &model, &error);
   if (!status) status = sonde_probe_create(SCENES[o->scene].probe, &b.probe, &error);
   b.samples = calloc(b.steps, sizeof *b.samples);
   if (!status && b.samples) {

@@ -160,7 +160,7 @@ static sonde_status find_path(const options *a, work *w, sonde_error *error) {
 }
 
 static sonde_status cut(const options *a, work *w, sonde_error *error) {
-  sonde_status status = sonde_model_load(a->model, &w->model, error);
+  sonde_status status = sonde_limb_model_load(a->model, &w->model, error);
   if (!status) status = find_path(a, w, error);
   if (status) return status;
   double start = app_seconds(CLOCK_MONOTONIC);

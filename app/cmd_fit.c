@@ -400,7 +400,7 @@ static sonde_status fit_model(const options *a, const fit_inputs *in, fit_outcom
   struct stat facts;
   if (!status && stat(a->output, &facts) == 0 && S_ISREG(facts.st_mode)) {
     sonde_model *read = NULL;
-    status = sonde_model_load(a->output, &read, error);
+    status = sonde_limb_model_load(a->output, &read, error);
     if (!status && read->checksum != model->checksum)
       status =
           app_error(error, SONDE_IO, "%.300s: holds another model than was written", a->output);

@@ -289,7 +289,7 @@ static int run(void *from) {
   sonde_error error = {0};
   sonde_model *model = NULL;
   sonde_status status = a->preset ? sonde_preset_load(a->preset, &preset, &error) : SONDE_OK;
-  if (!status) status = sonde_model_load(a->model, &model, &error);
+  if (!status) status = sonde_limb_model_load(a->model, &model, &error);
   if (!status) status = sonde_preset_apply(&preset, model, &world, &error);
   int code = status             ? app_fail(VERB, &error)
              : a->simulate >= 0 ? simulate(a, model, &world)

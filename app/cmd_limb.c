@@ -9,7 +9,7 @@
 static const char VERB[] = "limb";
 
 typedef struct options {
-  const char *atlas, *skin, *levels;
+  const char *atlas, *skin, *levels, *model;
   bool json;
   long seed;
   int sex, side; // -1: drawn, right
@@ -31,6 +31,8 @@ static const app_option TABLE[] = {
     OPT_TEXT(levels, "levels", "L,L...",
              "levels of the sections: 0 hip, 1 knee joint line, 2 ankle; default -0.05 to 1.9"),
     OPT_OUTPUT(skin, "skin", "FILE", "write the skin as .ply, .obj or .stl, mm"),
+    OPT_OUTPUT(model, "model", "FILE",
+               "write the limb as a model (.sonde) that can be pressed and imaged"),
     OPT_JSON(json),
     OPT_GROUP("Parameters of the body; what is not given is drawn")};
 
@@ -112,6 +114,7 @@ static void print_json(const options *a, const sonde_limb *limb) {
   app_json_close();
   if (a->atlas) app_json_text("atlas", a->atlas);
   if (a->skin) app_json_text("skin", a->skin);
+  if (a->model) app_json_text("model", a->model);
   app_json_end();
 }
 
@@ -162,6 +165,11 @@ static int run(void *from) {
     snprintf(path, sizeof path, "%s/view.svg", a->atlas);
     status = sonde_limb_view_svg(limb, path, &error);
   }
+  sonde_model *model = NULL;
+  const sonde_limb_model_def def = sonde_limb_model_def_default();
+  if (!status && a->model) status = sonde_limb_model(&body, &def, &model, &error);
+  if (!status && a->model) status = sonde_model_save(model, a->model, &error);
+  sonde_model_destroy(model);
   if (!status && a->skin) status = sonde_limb_skin(limb, 0.004, &skin, &error);
   if (!status && a->skin) status = sonde_mesh_save(a->skin, 1e-3, &skin, &error);
   app_progress_end();

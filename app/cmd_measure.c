@@ -183,7 +183,7 @@ static int run(void *from) {
   sonde_model *model = NULL;
   sonde_site_table sites = {0};
   sonde_error error = {0};
-  sonde_status status = sonde_model_load(a->model, &model, &error);
+  sonde_status status = sonde_limb_model_load(a->model, &model, &error);
   if (!status)
     status = a->sites ? sonde_site_table_load(a->sites, &sites, &error)
                       : sonde_sites_place(model, &a->places, &sites, &error);

@@ -104,7 +104,7 @@ static sonde_status work(paper *p, sonde_error *error) {
   double all = 0, done = 0;
   for (int k = 0; k < PART_COUNT; ++k) all += PARTS[k].seconds;
   p->progress = app_progress();
-  sonde_status status = sonde_model_load(p->model_path, &p->model, error);
+  sonde_status status = sonde_limb_model_load(p->model_path, &p->model, error);
   if (!status) status = gather(p, error);
   if (!status) status = load_third(p, error);
   for (int k = 0; k < PART_COUNT && !status; ++k) {

@@ -45,7 +45,7 @@ static int run(void *from) {
   double start = app_seconds(CLOCK_MONOTONIC), *predicted_n = NULL;
 
   // The sites are those of the table, else those that the model carries.
-  sonde_status status = sonde_model_load(a->model, &model, &error);
+  sonde_status status = sonde_limb_model_load(a->model, &model, &error);
   if (!status && a->sites) status = sonde_site_table_load(a->sites, &loaded, &error);
   if (status) goto done;
   sonde_site_table sites =

@@ -73,7 +73,7 @@ static int run(void *from) {
   if (!status && !s->model && access(path, R_OK) != 0 &&
       app_bundled_model(bundled, sizeof bundled, searched, sizeof searched))
     path = bundled;
-  if (!status) status = sonde_model_load(path, &model, &error);
+  if (!status) status = sonde_limb_model_load(path, &model, &error);
   sonde_player_def def = {.path = s->recording, .model = model, .recover = s->recover};
   if (!status) status = sonde_player_open(&def, &player, &error);
   if (!status) {

@@ -343,7 +343,7 @@ static int run(void *from) {
   sonde_error error = {0};
   sonde_model *model = NULL;
   sonde_session_def def;
-  if (sonde_model_load(s->model, &model, &error)) return app_fail("run", &error);
+  if (sonde_limb_model_load(s->model, &model, &error)) return app_fail("run", &error);
   char *absolute = realpath(s->model, NULL);
   int code = APP_OK;
   // Everything of the session but its model. names: filled with the probes, ended by NULL.

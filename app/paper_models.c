@@ -63,7 +63,7 @@ static sonde_status remake(const paper *p, const sonde_surface_law *law, const s
   if (!known) return error->status = SONDE_MEMORY;
   for (uint32_t s = 0; s < p->sites.count; ++s)
     if (sites[s].k0_n_m3 > 0) known[count++] = sites[s];
-  sonde_status status = sonde_model_load(p->model_path, model, error);
+  sonde_status status = sonde_limb_model_load(p->model_path, model, error);
   if (!status) {
     assert(count <= (*model)->site_count);
     (*model)->site_count = count;

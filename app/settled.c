@@ -17,7 +17,7 @@ sonde_status settled_open(settled *s, const char *model, const char *probe,
   sonde_world_def world = sonde_world_def_default();
   world.engine = SONDE_ENGINE_DOUBLE; // nothing but equilibria
   sonde_status status = sonde_probe_create(probe, &s->probe, error);
-  if (!status) status = sonde_model_load(model, &s->model, error);
+  if (!status) status = sonde_limb_model_load(model, &s->model, error);
   if (!status && preset) status = sonde_preset_apply(preset, s->model, &world, error);
   if (!status) status = sonde_state_create(s->model, &world, &s->state, error);
   if (status || (!needs_interior && !s->model->femur.vertex_count)) return status;

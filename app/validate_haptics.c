@@ -399,7 +399,7 @@ int validate_haptics(const char *model, const char *pressing_path, long sites, b
   sonde_error error = {0};
   work w = {.o = &o, .error = &error, .list = {.json = json, .working = "haptics"}};
   sonde_world_def world = haptics_world();
-  sonde_status status = sonde_model_load(model, &w.model, &error);
+  sonde_status status = sonde_limb_model_load(model, &w.model, &error);
   if (!status) status = sonde_probe_create("linear", &w.probe, &error);
   if (!status) status = sonde_state_create(w.model, &world, &w.state, &error);
   if (!status) {

@@ -37,6 +37,11 @@ SONDE_API sonde_limb_model_def sonde_limb_model_def_default(void); /**< @thread 
 SONDE_API sonde_status sonde_limb_model(const sonde_limb_body *body,
                                         const sonde_limb_model_def *def, sonde_model **model,
                                         sonde_error *error);
+/** As sonde_model_load(), and makes the limb of such a model again; a model that is no limb's stays
+ *  as it is. @return VERSION when this program makes another limb of the file's body @thread owner
+ */
+SONDE_API sonde_status sonde_limb_model_load(const char *path, sonde_model **model,
+                                             sonde_error *error);
 /** The limb of such a model, NULL of any other; the model's. @thread any */
 SONDE_API const sonde_limb *sonde_limb_of(const sonde_model *model);
 /** A point of the limb's frame in the model's, or the other way. @thread any */

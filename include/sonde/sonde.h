@@ -37,6 +37,7 @@
 #include "sonde/haptics_render.h"
 #include "sonde/files.h"
 #include "sonde/limb.h"
+#include "sonde/limb_model.h"
 #include "sonde/limb_vessels.h"
 #include "sonde/exam.h"
 #include "sonde/exam_journal.h"

@@ -162,6 +162,9 @@ typedef struct sonde_model {
   /** NULL: tissue follows from the layers above; or what knows it at every point
       (sonde/tissue_anatomy.h); released with the model by map->destroy. */
   struct sonde_tissue_map *map;
+  double *map_origin; /**< NULL, or [map_origin_count] from which the map is made again: files keep
+                         these numbers, not the map */
+  uint32_t map_origin_count;
   struct sonde_bulk *bulk; /**< NULL, or of a volumetric model; released with it */
   uint64_t checksum;       /**< of the file's content; 0 before it is saved or loaded */
 } sonde_model;

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_TRAINER_CASE_H
 #define SONDE_SRC_TRAINER_CASE_H
 
+#include "sonde/limb_model.h"
 #include "trainer/trainer.h"
 
 extern const char *const sonde_case_levels[];   // NULL-terminated, in the order of the enum

@@ -23,13 +23,13 @@ static sonde_status get_model(const sonde_case *from, const char *bundled, const
     return status;
   }
   if (from->thigh == SONDE_CASE_BUNDLED) {
-    if (bundled) return sonde_model_load(bundled, model, error);
+    if (bundled) return sonde_limb_model_load(bundled, model, error);
     return sonde_fail(error, SONDE_NOT_FOUND, "case %s needs the bundled thigh", from->id);
   }
   char path[4096];
   bool alone = !directory || from->model[0] == '/';
   snprintf(path, sizeof path, "%.3700s%s%s", alone ? "" : directory, alone ? "" : "/", from->model);
-  return sonde_model_load(path, model, error);
+  return sonde_limb_model_load(path, model, error);
 }
 
 // A stretch of vein as z of the model.

@@ -280,6 +280,53 @@ static void name_parts(const sonde_limb *limb,
   a->fascia_medial_m = 0.0008, a->fascia_lateral_m = 0.0011;
 }
 
+/* ---- the body as numbers ------------------------------------------------------------------ */
+
+enum { ORIGIN_VERSION = 1, ORIGIN_HEAD = 5 };
+
+// Version, sex, side, both halves of the seed, the parameters in the order of SONDE_LIMB_LIST, the
+// muscles' shares.
+static uint32_t body_numbers(sonde_limb_body *body, double **number) {
+  uint32_t count = 0;
+#define X(member, name, unit, low, high, text) number[count++] = &body->member;
+  SONDE_LIMB_LIST(X)
+#undef X
+  for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) number[count++] = &body->share[k];
+  return count;
+}
+
+enum { MOST_NUMBERS = 128 };
+
+static sonde_status keep_body(const sonde_limb_body *body, sonde_model *model, sonde_error *error) {
+  sonde_limb_body copy = *body;
+  double *number[MOST_NUMBERS];
+  const uint32_t count = body_numbers(&copy, number);
+  double *to = model->map_origin = SONDE_NEW(double, ORIGIN_HEAD + count);
+  if (!to) return sonde_fail_memory(error);
+  model->map_origin_count = ORIGIN_HEAD + count;
+  to[0] = ORIGIN_VERSION, to[1] = body->sex, to[2] = body->side;
+  to[3] = (double)(body->seed >> 32), to[4] = (double)(body->seed & 0xffffffffu);
+  for (uint32_t k = 0; k < count; ++k) to[ORIGIN_HEAD + k] = *number[k];
+  return SONDE_OK;
+}
+
+static bool read_body(const sonde_model *model, sonde_limb_body *body) {
+  const double *from = model->map_origin;
+  double *number[MOST_NUMBERS];
+  *body = sonde_limb_unknown();
+  const uint32_t count = body_numbers(body, number);
+  if (model->map_origin_count != ORIGIN_HEAD + count || from[0] != ORIGIN_VERSION) return false;
+  if (!(from[1] == SONDE_SEX_FEMALE || from[1] == SONDE_SEX_MALE) ||
+      !(from[2] == SONDE_LIMB_RIGHT || from[2] == SONDE_LIMB_LEFT) ||
+      !(from[3] >= 0 && from[3] < 4294967296.0 && from[4] >= 0 && from[4] < 4294967296.0))
+    return false;
+  body->sex = (sonde_sex)from[1], body->side = (sonde_limb_side)from[2];
+  body->seed = (uint64_t)from[3] << 32 | (uint64_t)from[4];
+  for (uint32_t k = 0; k < count; ++k)
+    if (!isfinite(*number[k] = from[ORIGIN_HEAD + k])) return false;
+  return true;
+}
+
 /* ---- the model ---------------------------------------------------------------------------- */
 
 static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sonde_mesh *skin,
@@ -304,6 +351,7 @@ static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sond
   if (!model->anatomy) return sonde_fail_memory(error);
   status = limb_map_create(limb, &model->map, error);
   if (!status) status = lay_axis(limb, model, error);
+  if (!status) status = keep_body(&limb->body, model, error);
   if (status) return status;
   lay_springs(limb, def, model);
   // Sites have the springs of the nodes beside them.
@@ -346,4 +394,43 @@ sonde_status sonde_limb_model(const sonde_limb_body *body, const sonde_limb_mode
 const sonde_limb *sonde_limb_of(const sonde_model *model) {
   SONDE_ASSERT(model);
   return limb_map_is(model->map) ? model->map->self : NULL;
+}
+
+sonde_status sonde_limb_model_load(const char *path, sonde_model **out, sonde_error *error) {
+  sonde_model *model;
+  *out = NULL;
+  sonde_status status = sonde_model_load(path, &model, error);
+  if (status || !model->map_origin) {
+    *out = model;
+    return status;
+  }
+  const double tolerance_m = 1e-6;
+  sonde_limb_body body;
+  sonde_limb *limb = NULL;
+  if (!read_body(model, &body))
+    status = sonde_fail(error, SONDE_VERSION,
+                        "%s: describes a limb that this program does not know", path);
+  if (!status) status = sonde_limb_draw(&body, body.seed, &body, error);
+  if (!status) status = sonde_limb_create(&body, &limb, error);
+  if (!status) status = limb_map_create(limb, &model->map, error);
+  if (status) {
+    sonde_limb_destroy(limb);
+    sonde_model_destroy(model);
+    return status;
+  }
+  // The same limb has its vein where the file says.
+  sonde_vessel vein = {0};
+  chain veins = find_chain(limb, VEINS);
+  lay_line(limb, &veins, true, &vein);
+  bool same = vein.count == model->vein.count;
+  for (uint32_t k = 0; same && k < vein.count; ++k)
+    same = v_distance(vein.point[k].centre_m, model->vein.point[k].centre_m) < tolerance_m;
+  if (same) {
+    *out = model;
+    return SONDE_OK;
+  }
+  sonde_model_destroy(model);
+  return sonde_fail(error, SONDE_VERSION,
+                    "%s: was made by a program that makes another limb of this body; make it again",
+                    path);
 }

@@ -258,7 +258,7 @@ void sonde_model_destroy(sonde_model *model) {
       model->xm_m,        model->fat_depth_m, model->bone_depth_m, model->muscle_depth_m,
       model->edge_rest_m, model->edge_share,  model->face_area_m2, model->face_half_cotangent,
       model->face_edge,   model->sites,       model->data,         model->anatomy,
-      model->shear_share, model->limit_share, model->bone_axis_m};
+      model->shear_share, model->limit_share, model->bone_axis_m,  model->map_origin};
   for (size_t k = 0; k < SONDE_COUNT_OF(arrays); ++k) sonde_free(arrays[k]);
   if (model->map) model->map->destroy(model->map);
   sonde_bulk_destroy(model->bulk);

@@ -190,7 +190,9 @@ sonde_status sonde_anatomy_take(const sonde_model_reader *r, sonde_model *model)
 
   row = sonde_model_take(r, "anatomy_levels", "f64", LEVEL_COLUMNS, &rows);
   if (!row) return SONDE_FORMAT;
-  if (rows < 2 || rows > SONDE_LEVELS) return wrong(r, "a wrong number of levels");
+  const bool limb = model->map_origin != NULL; // its map knows the muscles
+  if ((rows < 2 && !(limb && rows == 0)) || rows > SONDE_LEVELS)
+    return wrong(r, "a wrong number of levels");
   a->level_count = rows;
   for (k = 0; k < rows; ++k) {
     double x[LEVEL_COLUMNS];

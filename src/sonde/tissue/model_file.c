@@ -13,8 +13,9 @@
 #include <zlib.h>
 
 #define MAGIC "SONDE-MODEL "
-// Volumetric models have version 5, so that programs which do not know them refuse them.
-enum { BULK_VERSION = 5, FORMAT_VERSION = 4, OLDEST_VERSION = 2 };
+// Volumetric models have version 5 and limbs version 6, so that programs which do not know them
+// refuse them.
+enum { LIMB_VERSION = 6, BULK_VERSION = 5, FORMAT_VERSION = 4, OLDEST_VERSION = 2 };
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 
@@ -187,6 +188,10 @@ static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
   put_sites(w, probe, model);
   put_vessel(w, "vein", &model->vein);
   put_vessel(w, "artery", &model->artery);
+  if (model->bone_axis_m) {
+    sonde_model_put(w, "bone_axis", "f64", "m", model->bone_axis_count, 3, model->bone_axis_m);
+    sonde_model_put(w, "map_origin", "f64", "SI", model->map_origin_count, 1, model->map_origin);
+  }
   if (model->anatomy) sonde_anatomy_put_arrays(w, model->anatomy);
   if (model->bulk) sonde_bulk_put_arrays(w, model);
   sonde_json_end(header);
@@ -216,7 +221,10 @@ sonde_status sonde_model_save(sonde_model *model, const char *path, sonde_error 
   if (!status) {
     // magic line, header, arrays and the CRC-32 of them all
     size_t length = (size_t)snprintf(magic, sizeof magic, MAGIC "%d %zu %zu\n",
-                                     model->bulk ? BULK_VERSION : FORMAT_VERSION, count, w.used);
+                                     model->bone_axis_m ? LIMB_VERSION
+                                     : model->bulk      ? BULK_VERSION
+                                                        : FORMAT_VERSION,
+                                     count, w.used);
     uLong crc = crc32_z(0, (const Bytef *)magic, length);
     crc = crc32_z(crc, (const Bytef *)text, count);
     uint32_t tail = (uint32_t)crc32_z(crc, (const Bytef *)w.blob, w.used);
@@ -447,6 +455,26 @@ static bool take_cuts(const reader *r, sonde_model *model) {
   return true;
 }
 
+// A limb brings the line of its bones and the numbers of its tissue map.
+static bool take_limb(const reader *r, sonde_model *model) {
+  uint32_t points, numbers;
+  const char *axis = sonde_model_take(r, "bone_axis", "f64", 3, &points);
+  const char *origin = axis ? sonde_model_take(r, "map_origin", "f64", 1, &numbers) : NULL;
+  if (!origin) return false;
+  if (points < 2) {
+    sonde_fail(r->error, SONDE_FORMAT, "%s: bone_axis has %u points, expected 2 or more", r->path,
+               points);
+    return false;
+  }
+  model->bone_axis_m = SONDE_NEW(sonde_vec3, points);
+  model->map_origin = SONDE_NEW(double, numbers);
+  if (!model->bone_axis_m || !model->map_origin) return false;
+  model->bone_axis_count = points, model->map_origin_count = numbers;
+  memcpy(model->bone_axis_m, axis, points * sizeof *model->bone_axis_m);
+  if (numbers) memcpy(model->map_origin, origin, numbers * sizeof *model->map_origin);
+  return numbers_within(r, "bone_axis", &model->bone_axis_m[0].x, 3 * (size_t)points, -100, 100);
+}
+
 // The skin encloses the thigh; a cut one when its lips are put together.
 static sonde_status check_closed(const reader *r, const sonde_model *model, bool is_cut) {
   bool closes = true;
@@ -502,6 +530,7 @@ static sonde_status read_model(const reader *r, sonde_model *model) {
   if (!take_sites(r, model) || !take_data(r, model) || !take_vessel(r, "vein", &model->vein) ||
       !take_vessel(r, "artery", &model->artery) || !check_numbers(r, model))
     return SONDE_FORMAT;
+  if (find_array(r, "bone_axis") && !take_limb(r, model)) return SONDE_FORMAT;
   if ((status = sonde_anatomy_take(r, model)) != SONDE_OK) return status;
   bool is_cut = find_array(r, "edge_share") != NULL;
   if (!is_cut) status = check_closed(r, model, false);
@@ -536,9 +565,9 @@ sonde_status sonde_model_load(const char *path, sonde_model **out, sonde_error *
                           stored);
     else if (sscanf(bytes + strlen(MAGIC), "%d %zu %zu%n", &version, &text, &blob, &used) != 3)
       status = sonde_fail(error, SONDE_FORMAT, "%s:1: expected a version and two sizes", path);
-    else if (version < OLDEST_VERSION || version > BULK_VERSION)
+    else if (version < OLDEST_VERSION || version > LIMB_VERSION)
       status = sonde_fail(error, SONDE_VERSION, "%s: has format version %d, expected %d to %d",
-                          path, version, OLDEST_VERSION, BULK_VERSION);
+                          path, version, OLDEST_VERSION, LIMB_VERSION);
     start = strlen(MAGIC) + (size_t)used + 1;
     if (!status && (text > count || blob > count || start + text + blob + 4 != count))
       status = sonde_fail(error, SONDE_FORMAT,
