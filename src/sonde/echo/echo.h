@@ -107,6 +107,8 @@ struct sonde_echo {
   uint32_t shown_count;
   uint32_t lesion[MOST_LESIONS]; // lesions in view
   uint32_t lesion_count;
+  uint32_t cell[MOST_CELLS]; // seeds in view, of a model with a tissue map
+  uint32_t cell_count;
   uint32_t fields, levels;     // of the plane and of the medium
   plane_node *node;            // [PLANE_NODES]
   float *plane;                // [MOST_FIELDS][PLANE_NODES] and a vector

@@ -153,6 +153,17 @@ typedef struct tissue_lesion {
   float scatter;
 } tissue_lesion;
 
+// A seed of a muscle's cell, or of fat between muscles.
+typedef struct tissue_cell {
+  float x_mm, y_mm; // in the section
+  float cell;       // number: seeds of one cell have no boundary
+  float section;    // number of the compartment: a septum parts two
+  float muscle;     // 1, or 0: fat
+  float lean;       // of the fibres: depth per length along the leg
+  float turn;       // shift of the texture, so that neighbours differ
+  float gain;       // of the backscatter
+} tissue_cell;
+
 // A row of the coarse plane, per line.
 typedef struct widen_job {
   const float *in;       // [columns], readable for a whole vector more
@@ -169,6 +180,9 @@ typedef struct tissue_job {
   uint32_t vessels, lesions;          // in view; the first two are the femoral vein and artery
   tissue_vessel vessel[MOST_VESSELS]; // branches after their parents
   tissue_lesion lesion[MOST_LESIONS];
+  uint32_t cells; // 0: the layers alone
+  tissue_cell cell[MOST_CELLS];
+  float beam_x, beam_y;      // direction of the beam in the section
   float bone_radius_m;       // of the cylinder about the leg's axis
   float webs, oedema;        // 0..1
   float rough_bone, rough_m; // amplitude over muscle on a level cortex, fading over so far from it

@@ -56,9 +56,58 @@ INLINE void mark_both(ints mask, floats scatter, floats loss, floats out[2]) {
   out[0] = vselect(mask, scatter, out[0]), out[1] = vselect(mask, loss, out[1]);
 }
 
+// Epimysium and septa: half thickness, m, and brightness when the beam meets them squarely.
+static const float epimysium_m = 0.45e-3f, septum_m = 0.7e-3f;
+static const float epimysium_scatter = 1.3f, septum_scatter = 2.2f, grazing = 0.25f;
+static const float superficial_m = 0.4e-3f, superficial_scatter = 1.6f;
+
+// The muscle that a point belongs to, and what parts it from the next one.
+typedef struct muscle_place {
+  floats muscle, lean, turn, gain; // of the cell
+  floats bright;                   // of its boundary there
+} muscle_place;
+
+// The cell with the least power, and the least of another cell: the boundary lies half the
+// difference over the seeds' distance away.
+INLINE muscle_place place_in_muscles(const tissue_job *job, const float *field) {
+  const uint32_t n = job->lines;
+  floats least = vset(1e30f), next = vset(1e30f), cell = vset(-1);
+  floats x = vset(0), y = vset(0), next_x = vset(0), next_y = vset(0);
+  floats section = vset(0), next_section = vset(0);
+  muscle_place at = {vset(1), vset(0), vset(0), vset(1), vset(0)};
+  for (uint32_t k = 0; k < job->cells; ++k) {
+    const tissue_cell *c = &job->cell[k];
+    const floats power = vload(field + k * n);
+    const ints own = cell == c->cell, first = power < least;
+    // The cell so far becomes the next one when another takes its place.
+    const ints pushed = first & ~own, second = ~first & ~own & (power < next);
+    next = vselect(pushed, least, next), next_x = vselect(pushed, x, next_x);
+    next_y = vselect(pushed, y, next_y), next_section = vselect(pushed, section, next_section);
+    next = vselect(second, power, next), next_x = vselect(second, vset(c->x_mm), next_x);
+    next_y = vselect(second, vset(c->y_mm), next_y);
+    next_section = vselect(second, vset(c->section), next_section);
+    least = vselect(first, power, least), cell = vselect(first, vset(c->cell), cell);
+    x = vselect(first, vset(c->x_mm), x), y = vselect(first, vset(c->y_mm), y);
+    section = vselect(first, vset(c->section), section);
+    at.muscle = vselect(first, vset(c->muscle), at.muscle);
+    at.lean = vselect(first, vset(c->lean), at.lean);
+    at.turn = vselect(first, vset(c->turn), at.turn);
+    at.gain = vselect(first, vset(c->gain), at.gain);
+  }
+  floats dx = x - next_x, dy = y - next_y, apart = vsqrt(dx * dx + dy * dy) + 1e-3f;
+  floats away = (next - least) * 0.5e-3f / apart; // m
+  ints septum = section != next_section;
+  floats half = vselect(septum, vset(septum_m), vset(epimysium_m));
+  floats height = vmax(1 - away / half, vset(0));
+  floats square = (dx * job->beam_x + dy * job->beam_y) / apart;
+  floats facing = grazing + (1 - grazing) * square * square;
+  at.bright = height * facing * vselect(septum, vset(septum_scatter), vset(epimysium_scatter));
+  return at;
+}
+
 // Layer by layer; levels 1 and 2 are the depths below dermis and fascia.
-INLINE void layers(const tissue_job *job, knots *memory, const floats *level, floats theta,
-                   floats s, floats depth, floats out[2]) {
+INLINE void layers(const tissue_job *job, knots *memory, const float *map, const floats *level,
+                   floats theta, floats s, floats depth, floats out[2]) {
   ints in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
   floats fat_scatter = vset(fat_tissue[0]),
          muscle_scatter = vset(job->plain ? 1 : muscle_tissue[0]);
@@ -69,8 +118,22 @@ INLINE void layers(const tissue_job *job, knots *memory, const floats *level, fl
     fat_scatter = (fat_scatter * (1 + job->oedema)) * (1 - fluid) + fluid_tissue[0] * fluid;
     fat_loss += fluid * (fluid_tissue[1] - fat_loss);
   }
+  // Muscles of a map: each with its own fibres, fat between them, sheaths around them.
+  floats fibres = depth, between = vset(0), sheaths = vset(0);
+  if (job->cells > 0 && vany(in_muscle)) {
+    muscle_place at = place_in_muscles(job, map + job->lines);
+    fibres = depth - at.lean * s + at.turn;
+    muscle_scatter = muscle_scatter * at.gain;
+    between = 1 - at.muscle, sheaths = at.bright;
+  }
   if (!job->plain && vany(in_muscle))
-    muscle_scatter = muscle_scatter * power2(bundles(memory, theta, s, depth) * 0.16609640474f);
+    muscle_scatter = muscle_scatter * power2(bundles(memory, theta, s, fibres) * 0.16609640474f);
+  if (job->cells > 0) {
+    floats loose = fat_tissue[0] * (job->plain ? vset(1) : 1.4f + septa(memory, theta, s, depth));
+    muscle_scatter = muscle_scatter + between * (loose - muscle_scatter) + sheaths;
+    floats thin = vmax(1 - vabs(vload(map)) * (1 / superficial_m), vset(0));
+    fat_scatter += job->plain ? vset(0) : superficial_scatter * thin;
+  }
   ints sheath = (level[1] >= 0) & (vabs(level[2]) < 0.7e-3f);
   if (!job->plain && vany(sheath)) {
     floats more = fascia(memory, theta, s, level[2]);
@@ -177,7 +240,8 @@ INLINE ints paint(const tissue_job *job, uint32_t l) {
     wall[v] = wall_distance(vload(at), vload(at + n), vload(half), vload(half + n));
   }
   floats tissue[2] = {vset(skin_tissue[0]), vset(skin_tissue[1])};
-  layers(job, memory, level, theta, s, depth, tissue);
+  const float *map = f + map_field_at(job->vessels, job->lesions, 0) * n;
+  layers(job, memory, map, level, theta, s, depth, tissue);
   for (uint32_t k = 0; k < job->lesions; ++k) {
     const float *at = f + lesion_field_at(job->vessels, k, 0) * n;
     floats q[3] = {vload(at), vload(at + n), vload(at + 2 * n)};

@@ -4,6 +4,7 @@
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/echo.h"
+#include "sonde/tissue_anatomy.h"
 
 #include <string.h>
 
@@ -36,6 +37,8 @@ static const float rough_share = 0.3f, rough_m = 0.4e-3f;
 static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
 
 static const uint32_t lesion_salt = 22; // of the first lesion; far branches have the same ones
+enum { CELL_SALT = 97 };
+static const float most_cell_db = 1.8f; // between muscles
 
 // Random number in [-1, 1) of a lattice point.
 static float knot(int32_t a, int32_t b, uint32_t salt) {
@@ -179,6 +182,32 @@ static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
         (tissue_lesion_kind)l->kind,
         {(float)(1 / l->half_m.x), (float)(1 / l->half_m.y), (float)(1 / l->half_m.z)},
         (float)l->echogenicity};
+  }
+  // Muscles: their fibres lean against the skin, and each has a brightness of its own.
+  const struct sonde_tissue_map *map = in->model->map;
+  job->cells = map != NULL ? echo->cell_count : 0;
+  if (job->cells > 0) {
+    const sonde_vec3 look = pose_apply(echo->frame.probe, vec3(0, 0, 0.4 * echo->frame.depth_m));
+    const sonde_vec3 beam = q_rotate(echo->frame.probe.rotation, vec3(0, 0, 1));
+    const double flat = fmax(hypot(beam.x, beam.y), 0.1);
+    double power[MOST_CELLS];
+    sonde_vec3 at[MOST_CELLS];
+    map->powers(map->self, look, job->cells, echo->cell, power, at);
+    job->beam_x = (float)(beam.x / flat), job->beam_y = (float)(beam.y / flat);
+    for (uint32_t k = 0; k < job->cells; ++k) {
+      const sonde_map_seed seed = map->seed(map->self, echo->cell[k], look);
+      const double down = fabs(seed.fibre.z) > 0.3 ? seed.fibre.z : 0.3;
+      const float own = knot((int32_t)seed.cell, 0, CELL_SALT);
+      job->cell[k] =
+          (tissue_cell){.x_mm = (float)(1e3 * at[k].x),
+                        .y_mm = (float)(1e3 * at[k].y),
+                        .cell = (float)seed.cell,
+                        .section = (float)seed.section,
+                        .muscle = seed.muscle ? 1 : 0,
+                        .lean = (float)((seed.fibre.x * beam.x + seed.fibre.y * beam.y) / down),
+                        .turn = 0.013f * own,
+                        .gain = amplitude_of_db(most_cell_db * own)};
+    }
   }
   // Facets of the cortex lie thinner than the pulse is long, which they fill only in part. The
   // energy of a tent is two thirds of its height's over its half width; that of the pulse is 0.83

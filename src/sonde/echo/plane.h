@@ -30,7 +30,9 @@ enum {
   LESION_FIELDS = 3, // coordinates at rest over the semi-axes
   MOST_VESSELS = 16, // in view at once
   MOST_LESIONS = 8,
-  MOST_FIELDS = PLANE_LAYERS + MOST_VESSELS * VESSEL_FIELDS + MOST_LESIONS * LESION_FIELDS
+  MOST_CELLS = 16, // seeds of muscles' cells in view, of a model with a tissue map
+  MOST_FIELDS =
+      PLANE_LAYERS + MOST_VESSELS * VESSEL_FIELDS + MOST_LESIONS * LESION_FIELDS + 1 + MOST_CELLS
 };
 
 static inline uint32_t vessel_field_at(uint32_t vessel, vessel_field field) {
@@ -38,6 +40,12 @@ static inline uint32_t vessel_field_at(uint32_t vessel, vessel_field field) {
 }
 static inline uint32_t lesion_field_at(uint32_t vessels, uint32_t lesion, uint32_t axis) {
   return (uint32_t)PLANE_LAYERS + vessels * VESSEL_FIELDS + lesion * LESION_FIELDS + axis;
+}
+// Of a model with a tissue map: distance to the superficial fascia, m, then |p - seed|^2 - weight
+// of each seed, mm^2. Its square terms are the same for all seeds, so that differences are linear
+// in p.
+static inline uint32_t map_field_at(uint32_t vessels, uint32_t lesions, uint32_t which) {
+  return lesion_field_at(vessels, lesions, 0) + which;
 }
 
 #endif

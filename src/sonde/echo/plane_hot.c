@@ -4,6 +4,7 @@
 #include "base/base.h"
 #include "echo/echo.h"
 #include "interior/fields.h"
+#include "sonde/tissue_anatomy.h"
 
 enum { FIRST_ITERATIONS = 24, ITERATIONS = 8, NEWTON_ITERATIONS = 4 };
 
@@ -81,6 +82,16 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
     field[VESSEL_HALF_SHORT * count] = (float)half_short;
     field[VESSEL_HALF_LONG * count] = (float)half_long;
     field[VESSEL_CLOT * count] = (float)clot;
+  }
+  // Fasciae and muscles as the tissue map has them.
+  if (map != NULL) {
+    double power[MOST_CELLS];
+    float *field = p + map_field_at(echo->shown_count, echo->lesion_count, 0) * count;
+    map->powers(map->self, rest, echo->cell_count, echo->cell, power, NULL);
+    p[PLANE_MUSCLE * count] = (float)(at.depth_m + depths.fascia_m);
+    *field = (float)depths.superficial_m;
+    for (uint32_t k = 0; k < echo->cell_count; ++k)
+      field[(k + 1) * count] = (float)(1e6 * power[k]);
   }
   // Coordinates in the lesions.
   for (uint32_t k = 0; k < echo->lesion_count; ++k) {
@@ -238,7 +249,15 @@ void sonde_echo_plane(sonde_echo *echo) {
     double reach = fmax(fmax(l->half_m.x, l->half_m.y), l->half_m.z);
     if (in_view(echo, now, 1.5 * reach)) echo->lesion[echo->lesion_count++] = k;
   }
-  echo->fields = lesion_field_at(echo->shown_count, echo->lesion_count, 0);
+  // Muscles around the picture's middle.
+  const struct sonde_tissue_map *map = in->model->map;
+  echo->cell_count = 0;
+  if (map != NULL) {
+    const sonde_vec3 look = pose_apply(f->probe, vec3(0, 0, 0.4 * f->depth_m));
+    echo->cell_count = map->seeds(map->self, look, INFINITY, MOST_CELLS, echo->cell);
+  }
+  echo->fields = lesion_field_at(echo->shown_count, echo->lesion_count, 0) +
+                 (map != NULL ? 1 + echo->cell_count : 0);
   echo->levels = LAYER_LEVELS + echo->shown_count + echo->lesion_count;
   SONDE_ASSERT(echo->fields <= MOST_FIELDS && echo->levels <= MOST_LEVELS);
   sonde_fields_begin(echo->motion, echo->interior, f->probe.position);
