@@ -205,13 +205,9 @@ static void find_row(sonde_echo *echo, uint32_t j, seeker row[SONDE_PLANE_COLUMN
   }
 }
 
-void sonde_echo_plane(sonde_echo *echo) {
-  SONDE_ASSERT(echo->frame.pathology != NULL && echo->frame.depth_m > 0);
+// Vessels, lesions and muscles in view, and so the fields and levels of this frame.
+static void find_in_view(sonde_echo *echo) {
   const frame *f = &echo->frame;
-  const sonde_vec3 beside = v_scale(q_rotate(f->probe.rotation, vec3(0, 1, 0)), step_beside);
-  sonde_column_point centre;
-  (void)sonde_interior_locate(echo->interior, f->probe.position, &centre);
-  echo->theta_centre = centre.theta;
   // The femoral vessels always, so that a leg without branches takes the same way through the
   // stages.
   const sonde_interior *in = echo->interior;
@@ -260,6 +256,16 @@ void sonde_echo_plane(sonde_echo *echo) {
                  (map != NULL ? 1 + echo->cell_count : 0);
   echo->levels = LAYER_LEVELS + echo->shown_count + echo->lesion_count;
   SONDE_ASSERT(echo->fields <= MOST_FIELDS && echo->levels <= MOST_LEVELS);
+}
+
+void sonde_echo_plane(sonde_echo *echo) {
+  SONDE_ASSERT(echo->frame.pathology != NULL && echo->frame.depth_m > 0);
+  const frame *f = &echo->frame;
+  const sonde_vec3 beside = v_scale(q_rotate(f->probe.rotation, vec3(0, 1, 0)), step_beside);
+  sonde_column_point centre;
+  (void)sonde_interior_locate(echo->interior, f->probe.position, &centre);
+  echo->theta_centre = centre.theta;
+  find_in_view(echo);
   sonde_fields_begin(echo->motion, echo->interior, f->probe.position);
   for (uint32_t j = 0; j < echo->plane_rows; ++j) {
     seeker row[SONDE_PLANE_COLUMNS];
