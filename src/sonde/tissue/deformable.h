@@ -55,6 +55,10 @@ typedef struct sonde_tissue {
   sonde_published published[SONDE_PUBLISHED];
   bool reads_rows; // neighbours read published[0]
   bool is_stiff;   // springs outweigh masses: sweeps from batch to batch would need many
+  // Of a body whose stiffness K is constant and whose masses are left out: the displacements
+  // [3 rows][batches][3] by a unit force along each axis of each row, K^-1. NULL: not known.
+  const reals *compliance;
+  real gain, damping_s; // of such a body: the present K over that of `compliance`; C over K
   // Vectors that a slot's evaluation, and its product with a direction, read and write at least.
   uint32_t evaluated_per_slot, multiplied_per_slot;
 } sonde_tissue;

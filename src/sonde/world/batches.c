@@ -215,6 +215,8 @@ static void destroy(sonde_engine_data *data) {
   if (!body) return;
   if (body->tissue) body->tissue->calls->destroy(body->tissue);
   sonde_second_thread_destroy(body->thread);
+  sonde_free(body->response.row);
+  sonde_free(body->response.stiffness);
   sonde_free(body->block);
   sonde_free(body);
 }
@@ -243,6 +245,20 @@ static sonde_status lay_out(sonde_batches *body, const sonde_model *model,
     sonde_batches_set_step(body, def);
     const sonde_layout layout = layout_of(body);
     status = calls->create(model, &layout, &body->step, body->rows, &body->tissue, error);
+  }
+  if (!status && body->tissue->compliance) {
+    sonde_response *r = &body->response;
+    uint32_t n = body->nodes.count;
+    size_t most = r->most = n < SONDE_RESPONSE_NODES ? n : SONDE_RESPONSE_NODES;
+    r->row = SONDE_NEW(uint32_t, most);
+    r->stiffness = SONDE_NEW(double, 18 * most * most + 9 * most);
+    if (!r->row || !r->stiffness)
+      status = sonde_fail_memory(error);
+    else {
+      r->matrix = r->stiffness + 9 * most * most;
+      r->way = r->matrix + 9 * most * most, r->move = r->way + 3 * most,
+      r->push = r->move + 3 * most;
+    }
   }
   sonde_free(room);
   sonde_free(place);

@@ -71,6 +71,16 @@ typedef struct sonde_region_push {
   double push_n, scale, gain;    // force; of the matrix; of the force by the rows' mean velocity
 } sonde_region_push;
 
+// Scratch of steps of a body whose compliance is known (respond.c). Of more touched nodes than it
+// has room for, the step is solved with the masses by conjugate gradients.
+enum { SONDE_RESPONSE_NODES = 192 };
+typedef struct sonde_response {
+  uint32_t most, count;       // touched nodes: room; of which `stiffness` is
+  uint32_t *row;              // [most] these
+  double *stiffness, *matrix; // [3 most][3 most]
+  double *way, *move, *push;  // [3 most]
+} sonde_response;
+
 struct sonde_batches {
   sonde_engine_data common;
   void *block;
@@ -133,6 +143,7 @@ struct sonde_batches {
   real *unrest2;     // [batches] largest square of unbalanced force over the anchors' stiffness: no
                      // node is farther from its equilibrium
   sonde_batch *base; // [batches] of double engines: where a search for equilibrium is
+  sonde_response response; // of a body whose compliance is known
   sonde_vec3 reaction_n, holder_n;
   uint32_t slot_total;  // of the batches last linearised
   bool by_gradients;    // conjugate gradients only: too stiff for sweeps, or double
@@ -206,6 +217,11 @@ void sonde_batches_couple(sonde_batches *body, const real *vectors);
 #define sonde_batches_conjugate BY_REAL(sonde_batches_conjugate)
 double sonde_batches_conjugate(sonde_batches *body, double target, uint32_t most_iterations,
                                sonde_batch_sums sums, uint32_t *iterations);
+
+// Solves the linear system of a body whose compliance is known into x; the square of the contact's
+// impulses, or forces of a search for equilibrium. False: not by this way. @thread tick
+#define sonde_batches_respond BY_REAL(sonde_batches_respond)
+bool sonde_batches_respond(sonde_state *state, sonde_batches *body, double *force2);
 
 // The widest kernels of a deformable model that this processor runs, or those called `name` (NULL:
 // widest).

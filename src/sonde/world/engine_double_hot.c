@@ -4,4 +4,6 @@
 
 #include "world/contact_batches.c"
 
+#include "world/respond.c"
+
 #include "world/newton.c"

@@ -3,4 +3,6 @@
 
 #include "world/contact_batches.c"
 
+#include "world/respond.c"
+
 #include "world/newton.c"

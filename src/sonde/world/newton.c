@@ -268,8 +268,8 @@ static void count_from_start(sonde_batches *body) {
 static bool iterate(sonde_state *state, sonde_batches *body, const sonde_probe *probe,
                     sonde_pose pose, const sonde_motion *motion, iteration *now, bool last) {
   double start = sonde_clock_now();
-  body->corners_coupled =
-      state->def.contact_law != SONDE_CONTACT_NODES && (now->number > 1 || SONDE_BATCH == 8);
+  bool coupled = now->number > 1 || SONDE_BATCH == 8 || body->tissue->compliance;
+  body->corners_coupled = coupled && state->def.contact_law != SONDE_CONTACT_NODES;
   sonde_batches_detect(state, body, probe, pose, motion);
   bool woke = false;
   for (uint32_t k = 0; k < state->touched_count; ++k) {
@@ -290,14 +290,17 @@ static bool iterate(sonde_state *state, sonde_batches *body, const sonde_probe *
 
   now->last = last;
   sonde_vec3 reaction = body->reaction_n;
-  bool sweep = !body->corners_coupled && !body->by_gradients;
-  sonde_batch_sums sums = sonde_parts_linearise(body, sweep);
-  if (now->local)
-    body->reaction_n = reaction;
-  else
-    now->force2 = sums.force2;
-  double assembled = sonde_clock_now();
-  bool solved = solve(state, body, now, sweep, sums, sqrt(now->force2));
+  bool sweep = !body->corners_coupled && !body->by_gradients, solved = true;
+  double assembled = detected;
+  if (!body->tissue->compliance || !sonde_batches_respond(state, body, &now->force2)) {
+    sonde_batch_sums sums = sonde_parts_linearise(body, sweep);
+    if (now->local)
+      body->reaction_n = reaction;
+    else
+      now->force2 = sums.force2;
+    assembled = sonde_clock_now();
+    solved = solve(state, body, now, sweep, sums, sqrt(now->force2));
+  }
   if (is_equation_4(state)) count_from_start(body);
   double end = sonde_clock_now();
 
@@ -392,6 +395,9 @@ bool sonde_batches_step(sonde_state *state, const sonde_probe *probe, sonde_pose
   state->times = (sonde_stage_times){0};
   state->solver = (sonde_pcg_result){0};
   body->common.bytes_moved = 0;
+  // A body that follows the touched nodes at once has nothing to sleep.
+  bool responds = body->tissue->compliance != NULL;
+  for (uint32_t s = 0; responds && s < body->common.batch_count; ++s) wake(body, s);
   list_awake(body);
   expect(state, body);
   iteration now = {.number = 1};
@@ -408,7 +414,7 @@ bool sonde_batches_step(sonde_state *state, const sonde_probe *probe, sonde_pose
   double size = sonde_parts_update(body);
   body->common.bytes_moved += sizeof(reals) * UPDATED_PER_BATCH * body->awake_count;
   bool finite = isfinite(size) && v_finite(state->contact.force_n);
-  if (finite) rest(state, body);
+  if (finite && !responds) rest(state, body);
   state->awake_nodes = 0;
   for (uint32_t a = 0; a < body->awake_count; ++a)
     state->awake_nodes += body->rows[body->awake[a]].used;

@@ -91,6 +91,8 @@ static bool line_search(const problem *p, double share, double first_slope, bala
   return false;
 }
 
+static const double SLOWED_S = 1; // tau of volumetric bodies at first
+
 // The solution goes to the base with the displacements it starts from; returns F.d of the whole
 // step.
 static double solve(const problem *p, const balance *now) {
@@ -105,9 +107,14 @@ static double solve(const problem *p, const balance *now) {
     memcpy(body->base[s].r, body->batch[s].r, sizeof body->base[s].r);
   }
   *solver = (sonde_pcg_result){.reference = now->residual};
-  solver->residual =
-      sonde_batches_conjugate(body, target, options.max_iterations, now->sums, &solver->iterations);
-  solver->converged = solver->residual <= target;
+  // A search that failed from here is slowed down by masses.
+  double force2;
+  bool responds = body->tissue->compliance && p->probe && p->tau_s >= SLOWED_S;
+  if (!responds || !sonde_batches_respond(p->state, body, &force2)) {
+    solver->residual = sonde_batches_conjugate(body, target, options.max_iterations, now->sums,
+                                               &solver->iterations);
+    solver->converged = solver->residual <= target;
+  }
   for (uint32_t s = 0; s < count; ++s) {
     memcpy(body->base[s].x, body->batch[s].x, sizeof body->base[s].x);
     descent += dot(body->base[s].r, body->base[s].x);

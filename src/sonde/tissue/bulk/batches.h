@@ -42,6 +42,7 @@ typedef struct bulk_tissue {
   bulk_slot *slot;     // [slots]
   bulk_spring *spring; // [slots] where there are springs
   bulk_corner *corner; // [corners] of a solid
+  reals *compliance;   // of a condensed solid, see sonde_tissue
 } bulk_tissue;
 
 #define sonde_bulk_calls BY_REAL(sonde_bulk_calls)

@@ -278,6 +278,7 @@ void sonde_bulk_graph_clear(sonde_bulk_graph *graph) {
   sonde_free(graph->spring);
   sonde_free(graph->block);
   sonde_free(graph->own);
+  sonde_free(graph->compliance);
   *graph = (sonde_bulk_graph){0};
 }
 

@@ -55,6 +55,7 @@ typedef struct sonde_bulk_graph {
   sonde_bulk_spring *spring;   // likewise; NULL without springs
   sonde_mat3 *block;           // likewise, K_ij of a linear solid; NULL for others
   sonde_mat3 *own;             // [node_count] K_ii at rest
+  double *compliance; // [3 node_count][3 node_count] of a condensed solid, (K*)^-1; else NULL
 } sonde_bulk_graph;
 sonde_status sonde_bulk_graph_create(const sonde_model *model, sonde_bulk_graph *graph,
                                      sonde_error *error);
@@ -71,7 +72,8 @@ typedef struct sonde_bulk_elastic {
 // @return ARGUMENT for a skin of more than 2,500 nodes; CONVERGENCE @thread owner
 SONDE_LINK sonde_status sonde_bulk_elastic_create(const sonde_model *model,
                                                   sonde_bulk_elastic *solid, sonde_error *error);
-// K* into the blocks of a condensed model's graph, whose neighbours are there. @thread owner
+// K* into the blocks of a condensed model's graph, whose neighbours are there, and its inverse.
+// @thread owner
 sonde_status sonde_bulk_condense(const sonde_model *model, sonde_bulk_graph *graph,
                                  sonde_error *error);
 // Masses and neighbours of a condensed model from those of the whole solid. @thread owner

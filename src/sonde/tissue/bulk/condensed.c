@@ -52,18 +52,26 @@ sonde_status sonde_bulk_condense(const sonde_model *model, sonde_bulk_graph *gra
   sonde_condensed *c = NULL;
   sonde_status status = sonde_bulk_elastic_create(model, &solid, error);
   if (status) return status;
-  // From here on K* alone is needed.
-  status = sonde_condensed_stiffness(solid.elastic, &c, error);
-  sonde_elastic_destroy(solid.elastic);
-  if (status) return status;
+  // From here on K* and its inverse are all that is needed.
   size_t side = 3 * (size_t)skin;
+  status = sonde_condensed_create(solid.elastic, 0, &c, NULL, error);
+  sonde_elastic_destroy(solid.elastic);
+  if (!status) graph->compliance = SONDE_NEW(double, side *side);
+  if (!status && !graph->compliance) status = sonde_fail_memory(error);
+  if (status) {
+    sonde_condensed_destroy(c);
+    return status;
+  }
   for (uint32_t a = 0; a < skin; ++a)
     for (uint32_t b = 0; b < skin; ++b) {
       uint32_t i = c->node[a], j = c->node[b];
       SONDE_ASSERT(i < skin && j < skin);
       sonde_mat3 *to = i == j ? &graph->own[i] : &graph->block[graph->start[i] + j - (j > i)];
-      for (size_t r = 0; r < 3; ++r)
+      for (size_t r = 0; r < 3; ++r) {
         memcpy(to->m[r], c->stiffness + (3 * a + r) * side + 3 * b, sizeof to->m[r]);
+        memcpy(graph->compliance + (3 * i + r) * side + 3 * j,
+               c->compliance + (3 * a + r) * side + 3 * b, sizeof to->m[r]);
+      }
     }
   sonde_condensed_destroy(c);
   return SONDE_OK;

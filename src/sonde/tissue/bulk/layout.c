@@ -9,8 +9,10 @@
 
 #define CARVE(field, count) (t->field = sonde_carve(base, &offset, (count), sizeof *t->field))
 
-static size_t carve(bulk_tissue *t, uint32_t batches, char *base) {
+// responding: nodes of a condensed solid, else 0.
+static size_t carve(bulk_tissue *t, uint32_t batches, uint32_t responding, char *base) {
   size_t offset = 0;
+  CARVE(compliance, 9 * (size_t)responding * batches);
   CARVE(batch, batches), CARVE(slot, t->slot_count);
   CARVE(spring, t->springs ? t->slot_count : 0), CARVE(corner, t->corner_count);
   return offset;
@@ -98,6 +100,13 @@ static void fill(bulk_tissue *tissue, const sonde_model *model, const sonde_layo
       uint32_t i = bulk->element[e][c];
       if (i < n) fill_corner(tissue, model, layout, graph, i, corners[i]++, e, c);
     }
+  // Compliance of a condensed solid, column by column.
+  for (size_t k = 0; graph->compliance && k < 3 * (size_t)n; ++k) {
+    reals *column = tissue->compliance + 3 * k * layout->batch_count;
+    for (uint32_t j = 0; j < 3 * n; ++j)
+      column[3 * (j / 3 / SONDE_BATCH) + j % 3][j / 3 % SONDE_BATCH] =
+          (real)graph->compliance[3 * k * n + j];
+  }
   // A row's stiffness, as the mean of its diagonal block, and how fast moves change it.
   for (uint32_t i = 0; i < n; ++i) {
     const sonde_mat3 *own = &graph->own[i];
@@ -121,6 +130,7 @@ static sonde_status create(const sonde_model *model, const sonde_layout *layout,
   uint32_t *corners = SONDE_NEW(uint32_t, n);
   char *room = sonde_calloc(batches + 1, sizeof(bulk_batch));
   bulk_batch *size = (void *)sonde_whole_lines(room);
+  uint32_t responding = model->kind == SONDE_CONDENSED_SOLID ? n : 0;
   sonde_bulk_graph graph = {0};
   sonde_status status = tissue && corners && room ? SONDE_OK : sonde_fail_memory(error);
   if (!status) status = sonde_bulk_graph_create(model, &graph, error);
@@ -149,11 +159,13 @@ static sonde_status create(const sonde_model *model, const sonde_layout *layout,
     }
     tissue->common.evaluated_per_slot = tissue->springs ? 34 : 18;
     tissue->common.multiplied_per_slot = 14;
-    tissue->block = sonde_calloc(1, carve(tissue, batches, NULL) + 63);
+    tissue->block = sonde_calloc(1, carve(tissue, batches, responding, NULL) + 63);
     if (!tissue->block) status = sonde_fail_memory(error);
   }
   if (!status) {
-    carve(tissue, batches, sonde_whole_lines(tissue->block));
+    carve(tissue, batches, responding, sonde_whole_lines(tissue->block));
+    if (responding > 0) tissue->common.compliance = tissue->compliance;
+    tissue->common.gain = tissue->gain, tissue->common.damping_s = tissue->damping_s;
     memcpy(tissue->batch, size, batches * sizeof *size);
     fill(tissue, model, layout, &graph, rows, corners);
     *out = &tissue->common;
@@ -174,6 +186,7 @@ static void tune(sonde_tissue *data, const sonde_model *tuned, const sonde_step_
   SONDE_ASSERT(tuned->bulk);
   tissue->damping_s = (real)tuned->bulk->law.damping_s;
   tissue->gain = (real)tuned->bulk->law.stiffness_scale / tissue->made_scale;
+  tissue->common.gain = tissue->gain, tissue->common.damping_s = tissue->damping_s;
 }
 
 const sonde_tissue_calls sonde_bulk_calls = {create, destroy, tune};
