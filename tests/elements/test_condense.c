@@ -62,17 +62,6 @@ static void test_equals_the_whole(void **state) {
       off = fmax(off, fabs(sum - (i == j)));
     }
   assert_true(off <= 1e-10);
-  // Columns of the whole solid's compliance.
-  sonde_condensed *few;
-  const uint32_t nodes[3] = {s.kept[1], s.kept[9], s.kept[30]}, places[3] = {1, 9, 30};
-  assert_ok(sonde_condensed_of_nodes(e, nodes, 3, 2, &few, &shape_error));
-  for (size_t i = 0; i < 9; ++i)
-    for (size_t j = 0; j < 9; ++j)
-      assert_near(
-          few->compliance[9 * i + j],
-          s.condensed->compliance[(3 * places[i / 3] + i % 3) * side + 3 * places[j / 3] + j % 3],
-          1e-10 * few->compliance[0]);
-  sonde_condensed_destroy(few);
   free(u);
   free(f);
   sonde_elastic_scratch_destroy(scratch);
@@ -176,9 +165,6 @@ static void test_refusals(void **state) {
   sonde_elastic *e = make_solid(&def, 1e4, 0.3);
   sonde_condensed *c;
   assert_int_equal(sonde_condensed_create(e, 1, &c, NULL, &shape_error), SONDE_ARGUMENT);
-  assert_null(c);
-  assert_int_equal(sonde_condensed_of_nodes(e, &t.surface_count, 1, 1, &c, &shape_error),
-                   SONDE_ARGUMENT);
   assert_null(c);
   sonde_elastic_destroy(e);
   sonde_tetrahedra_clear(&t);

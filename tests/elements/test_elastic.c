@@ -171,7 +171,7 @@ static void test_exchange(void **state) {
   sonde_elastic *e = make_solid(&def, 1e4, 0.48);
   sonde_elastic_scratch *s = make_scratch(e);
   const size_t n = 3 * (size_t)e->count;
-  double *u[2], *f[2], compliance[36];
+  double *u[2], *f[2];
   const uint32_t nodes[2] = {3, t.surface_count / 2};
   for (int k = 0; k < 2; ++k) {
     u[k] = calloc(n, sizeof *u[k]), f[k] = calloc(n, sizeof *f[k]);
@@ -180,11 +180,6 @@ static void test_exchange(void **state) {
   }
   double work = sonde_dot(f[0], u[1], (uint32_t)n);
   assert_near(sonde_dot(f[1], u[0], (uint32_t)n), work, 1e-10 * fabs(work));
-  assert_ok(sonde_elastic_compliance(e, nodes, 2, 2, compliance, &shape_error));
-  for (size_t i = 0; i < 6; ++i)
-    for (size_t j = 0; j < 6; ++j)
-      assert_near(compliance[6 * i + j], compliance[6 * j + i], 1e-11 * compliance[0]);
-  assert_near(compliance[0], u[0][3 * (size_t)e->unknown[3]] / 2, 1e-11 * compliance[0]);
   for (int k = 0; k < 2; ++k) free(u[k]), free(f[k]);
   sonde_elastic_scratch_destroy(s);
   sonde_elastic_destroy(e);
@@ -214,10 +209,6 @@ static void test_refusals(void **state) {
   assert_int_equal(sonde_elastic_set(e, young, 0.3, -1, &shape_error), SONDE_ARGUMENT);
   young[3] = 0;
   assert_int_equal(sonde_elastic_set(e, young, 0.3, 0, &shape_error), SONDE_ARGUMENT);
-  uint32_t bone = t.surface_count;
-  double compliance[9];
-  assert_int_equal(sonde_elastic_compliance(e, &bone, 1, 1, compliance, &shape_error),
-                   SONDE_ARGUMENT);
   free(held);
   free(young);
   sonde_elastic_destroy(e);

@@ -189,6 +189,58 @@ static void condensed_solid_moves_like_the_whole(void **unused) {
   free(skin[0]), free(skin[1]);
 }
 
+// Steps take a condensed solid where the search for equilibrium finds it, in both precisions, and
+// without a probe its dampers let it creep back: u falls by d/(d + h) in a step.
+static void condensed_solid_rests_and_creeps_back(void **unused) {
+  (void)unused;
+  sonde_model *model = make_ball(SONDE_CONDENSED_SOLID, NULL, 10e-3);
+  uint32_t count = model->surface.vertex_count;
+  const double depth = 5e-3;
+  sonde_error error = {0};
+  sonde_probe probe;
+  assert_int_equal(sonde_probe_create("linear", &probe, &error), SONDE_OK);
+  for (int k = 0; k < 2; ++k) {
+    sonde_world_def def = fixture_world_def();
+    def.friction.mu_static = def.friction.mu_kinetic = 0; // a search knows none
+    sonde_state *state[2];
+    for (int j = 0; j < 2; ++j) {
+      def.engine = k || j ? SONDE_ENGINE_DOUBLE : SONDE_ENGINE_FAST;
+      assert_int_equal(sonde_state_create(model, &def, &state[j], &error), SONDE_OK);
+    }
+    for (int t = 0; t <= 600; ++t)
+      sonde_step(state[0], &probe, fixture_pose(depth * fmin(t / 100.0, 1)));
+    for (int t = 1; t <= 10; ++t)
+      assert_true(
+          sonde_settle(state[1], &probe, fixture_pose(depth * t / 10), 1e-10, 200).converged);
+    const sonde_vec3 *x[2] = {sonde_state_positions(state[0]), sonde_state_positions(state[1])};
+    double apart = 0, force = sonde_state_contact(state[0])->force_n.x;
+    for (uint32_t i = 0; i < count; ++i) apart = fmax(apart, v_distance(x[0][i], x[1][i]));
+    double off = fabs(force / sonde_state_contact(state[1])->force_n.x - 1);
+    print_message("condensed at rest: force %.3f N, %.1e off, skin %.1e of the depth off\n", force,
+                  off, apart / depth);
+    assert_true(fabs(force) > 0.1 && off < 2e-6 && apart < 1e-6 * depth);
+
+    double d = model->bulk->law.damping_s, h = fixture_world_def().dt_s, worst = 0;
+    sonde_vec3 *before = calloc(count, sizeof *before);
+    sonde_step(state[0], NULL, fixture_pose(0));
+    memcpy(before, sonde_state_positions(state[0]), count * sizeof *before);
+    sonde_step(state[0], NULL, fixture_pose(0));
+    const sonde_vec3 *after = sonde_state_positions(state[0]);
+    for (uint32_t i = 0; i < count; ++i) {
+      sonde_vec3 rest = model->surface.vertices[i];
+      sonde_vec3 fallen = v_scale(v_sub(before[i], rest), d / (d + h));
+      worst = fmax(worst, v_distance(v_sub(after[i], rest), fallen));
+    }
+    print_message("creeps back within %.1e of the depth\n", worst / depth);
+    assert_true(d > 0 && worst < 1e-7 * depth);
+    free(before);
+    sonde_state_destroy(state[0]);
+    sonde_state_destroy(state[1]);
+  }
+  sonde_probe_clear(&probe);
+  sonde_model_destroy(model);
+}
+
 // Its file is the solid's; a skin too large for K* is refused where K* is made.
 static void condensed_solid_is_rebuilt_from_its_file(void **unused) {
   (void)unused;
@@ -349,6 +401,7 @@ int main(void) {
       cmocka_unit_test(forces_are_those_of_an_energy),
       cmocka_unit_test(neo_hookean_begins_like_the_linear_solid),
       cmocka_unit_test(condensed_solid_moves_like_the_whole),
+      cmocka_unit_test(condensed_solid_rests_and_creeps_back),
       cmocka_unit_test(condensed_solid_is_rebuilt_from_its_file),
       cmocka_unit_test(single_precision_follows_double),
       cmocka_unit_test(twice_the_stiffness_is_twice_the_force),

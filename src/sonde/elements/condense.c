@@ -8,24 +8,6 @@
 
 #include <string.h>
 
-static sonde_status allocate(const uint32_t *nodes, uint32_t count, bool stiffness, bool compliance,
-                             sonde_condensed **condensed, sonde_error *error) {
-  sonde_condensed *c = *condensed = SONDE_NEW(sonde_condensed, 1);
-  if (!c) return sonde_fail_memory(error);
-  const size_t side = 3 * (size_t)count;
-  c->count = count;
-  c->node = SONDE_NEW(uint32_t, count);
-  c->stiffness = stiffness ? SONDE_NEW(double, side *side) : NULL;
-  c->compliance = compliance ? SONDE_NEW(double, side *side) : NULL;
-  if (c->node && (c->compliance || !compliance) && (c->stiffness || !stiffness)) {
-    memcpy(c->node, nodes, count * sizeof *nodes);
-    return SONDE_OK;
-  }
-  sonde_condensed_destroy(c);
-  *condensed = NULL;
-  return sonde_fail_memory(error);
-}
-
 void sonde_condensed_destroy(sonde_condensed *c) {
   if (!c) return;
   sonde_free(c->node);
@@ -63,9 +45,9 @@ static sonde_status condense(const sonde_elastic *e, sonde_condensed *c, double 
   return status;
 }
 
-static sonde_status create(const sonde_elastic *e, uint32_t workers, bool invert,
-                           sonde_condensed **condensed, sonde_condensed_times *times,
-                           sonde_error *error) {
+sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
+                                    sonde_condensed **condensed, sonde_condensed_times *times,
+                                    sonde_error *error) {
   SONDE_ASSERT(e != NULL && condensed != NULL);
   *condensed = NULL;
   const uint32_t *nodes = e->node + (e->count - e->last_count);
@@ -78,37 +60,19 @@ static sonde_status create(const sonde_elastic *e, uint32_t workers, bool invert
   sonde_condensed_times ignored;
   if (!times) times = &ignored;
   double start = sonde_clock_now();
-  sonde_status status = allocate(nodes, e->last_count, true, invert, condensed, error);
-  if (!status) status = condense(e, *condensed, start, times, error);
-  if (!status && invert)
-    status = sonde_invert((*condensed)->stiffness, 3 * e->last_count, workers,
-                          (*condensed)->compliance, error);
-  times->inverse_s = sonde_clock_now() - start - times->analysis_s - times->factor_s;
-  if (status) {
-    sonde_condensed_destroy(*condensed);
-    *condensed = NULL;
+  const size_t side = 3 * (size_t)e->last_count;
+  sonde_condensed *c = *condensed = SONDE_NEW(sonde_condensed, 1);
+  if (!c) return sonde_fail_memory(error);
+  *c = (sonde_condensed){e->last_count, SONDE_NEW(uint32_t, e->last_count),
+                         SONDE_NEW(double, side *side), SONDE_NEW(double, side *side)};
+  sonde_status status =
+      c->node && c->stiffness && c->compliance ? SONDE_OK : sonde_fail_memory(error);
+  if (!status) {
+    memcpy(c->node, nodes, e->last_count * sizeof *nodes);
+    status = condense(e, c, start, times, error);
   }
-  return status;
-}
-
-sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
-                                    sonde_condensed **condensed, sonde_condensed_times *times,
-                                    sonde_error *error) {
-  return create(e, workers, true, condensed, times, error);
-}
-
-sonde_status sonde_condensed_stiffness(const sonde_elastic *e, sonde_condensed **condensed,
-                                       sonde_error *error) {
-  return create(e, 0, false, condensed, NULL, error);
-}
-
-sonde_status sonde_condensed_of_nodes(const sonde_elastic *e, const uint32_t *nodes, uint32_t count,
-                                      uint32_t workers, sonde_condensed **condensed,
-                                      sonde_error *error) {
-  SONDE_ASSERT(e != NULL && nodes != NULL && condensed != NULL);
-  sonde_status status = allocate(nodes, count, false, true, condensed, error);
-  if (!status)
-    status = sonde_elastic_compliance(e, nodes, count, workers, (*condensed)->compliance, error);
+  if (!status) status = sonde_invert(c->stiffness, 3 * c->count, workers, c->compliance, error);
+  times->inverse_s = sonde_clock_now() - start - times->analysis_s - times->factor_s;
   if (status) {
     sonde_condensed_destroy(*condensed);
     *condensed = NULL;

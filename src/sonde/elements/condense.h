@@ -10,8 +10,8 @@
 typedef struct sonde_condensed {
   uint32_t count;     // nodes; side = 3 count below
   uint32_t *node;     // [count] in the mesh
-  double *stiffness;  // [side][side] N/m, both triangles; NULL when only the compliance is known
-  double *compliance; // [side][side] m/N; NULL when only the stiffness is known
+  double *stiffness;  // [side][side] N/m, both triangles
+  double *compliance; // [side][side] m/N
 } sonde_condensed;
 
 // Seconds that the parts of the preparation took.
@@ -25,13 +25,6 @@ typedef struct sonde_condensed_times {
 SONDE_LINK sonde_status sonde_condensed_create(const sonde_elastic *elastic, uint32_t workers,
                                                sonde_condensed **condensed,
                                                sonde_condensed_times *times, sonde_error *error);
-// The same without the compliance. @thread owner
-sonde_status sonde_condensed_stiffness(const sonde_elastic *elastic, sonde_condensed **condensed,
-                                       sonde_error *error);
-// The compliance of any few nodes, column by column, without the stiffness. @thread owner
-sonde_status sonde_condensed_of_nodes(const sonde_elastic *elastic, const uint32_t *nodes,
-                                      uint32_t count, uint32_t workers, sonde_condensed **condensed,
-                                      sonde_error *error);
 SONDE_LINK void sonde_condensed_destroy(sonde_condensed *condensed);
 
 // Forces f[3 count] that move some nodes (by their place in the list) by u[3 count], all others

@@ -4,7 +4,6 @@
 #include "elements/material.h"
 #include "base/base.h"
 #include "base/maths.h"
-#include "base/parallel.h"
 
 #include <string.h>
 
@@ -279,57 +278,4 @@ sonde_status sonde_elastic_solve(const sonde_elastic *e, sonde_elastic_scratch *
   for (size_t k = 0; k < n; ++k)
     if (s->imposed[k / 3]) f[k] = right[k];
   return SONDE_OK;
-}
-
-// ---- compliance ---------------------------------------------------------------------------
-
-typedef struct columns {
-  const sonde_elastic *elastic;
-  const uint32_t *nodes;
-  uint32_t count;
-  double *compliance;
-  sonde_elastic_scratch **scratch; // [workers]
-  double **vectors;                // [workers] force and displacement
-} columns;
-
-static sonde_status solve_column(void *user, uint32_t worker, uint32_t item,
-                                 const atomic_bool *stop, sonde_error *error) {
-  const columns *c = user;
-  const sonde_elastic *e = c->elastic;
-  (void)stop;
-  const size_t n = 3 * (size_t)e->count, side = 3 * (size_t)c->count;
-  double *f = c->vectors[worker], *u = f + n;
-  memset(f, 0, n * sizeof *f);
-  f[3 * (size_t)e->unknown[c->nodes[item / 3]] + item % 3] = 1;
-  sonde_status status = sonde_elastic_solve(e, c->scratch[worker], NULL, 0, f, u, error);
-  for (size_t k = 0; k < side && !status; ++k)
-    c->compliance[item * side + k] = u[3 * (size_t)e->unknown[c->nodes[k / 3]] + k % 3];
-  return status;
-}
-
-sonde_status sonde_elastic_compliance(const sonde_elastic *e, const uint32_t *nodes, uint32_t count,
-                                      uint32_t workers, double *compliance, sonde_error *error) {
-  SONDE_ASSERT(e != NULL && nodes != NULL && count > 0 && compliance != NULL);
-  for (uint32_t k = 0; k < count; ++k)
-    if (nodes[k] >= e->mesh->node_count || e->unknown[nodes[k]] == UINT32_MAX)
-      return sonde_fail(error, SONDE_ARGUMENT, "node %u is missing or held", nodes[k]);
-  workers = sonde_parallel_workers(workers, 3 * count);
-  columns c = {e, nodes, count, compliance, NULL, NULL};
-  c.scratch = SONDE_NEW(sonde_elastic_scratch *, workers);
-  c.vectors = SONDE_NEW(double *, workers);
-  sonde_status status = c.scratch && c.vectors ? SONDE_OK : sonde_fail_memory(error);
-  for (uint32_t w = 0; w < workers && !status; ++w) {
-    status = sonde_elastic_scratch_create(e, &c.scratch[w], error);
-    if (!status && !(c.vectors[w] = SONDE_NEW(double, 6 * (size_t)e->count)))
-      status = sonde_fail_memory(error);
-  }
-  if (!status)
-    status = sonde_parallel_run(3 * count, workers, solve_column, &c, NULL, "compliance", error);
-  for (uint32_t w = 0; w < workers; ++w) {
-    if (c.scratch) sonde_elastic_scratch_destroy(c.scratch[w]);
-    if (c.vectors) sonde_free(c.vectors[w]);
-  }
-  sonde_free(c.scratch);
-  sonde_free(c.vectors);
-  return status;
 }

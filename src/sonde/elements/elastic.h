@@ -68,10 +68,5 @@ SONDE_LINK sonde_status sonde_elastic_solve(const sonde_elastic *elastic,
                                             sonde_elastic_scratch *scratch, const uint32_t *imposed,
                                             uint32_t imposed_count, double *f, double *u,
                                             sonde_error *error);
-// Compliance [3 node_count][3 node_count] of some nodes without condensing: column by column.
-// Columns are shared among `workers` threads (0: one per core). Held nodes are an ARGUMENT error.
-sonde_status sonde_elastic_compliance(const sonde_elastic *elastic, const uint32_t *nodes,
-                                      uint32_t node_count, uint32_t workers, double *compliance,
-                                      sonde_error *error);
 
 #endif

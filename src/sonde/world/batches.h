@@ -76,6 +76,7 @@ typedef struct sonde_region_push {
 enum { SONDE_RESPONSE_NODES = 192 };
 typedef struct sonde_response {
   uint32_t most, count;       // touched nodes: room; of which `stiffness` is
+  bool changed;               // since the last solution
   uint32_t *row;              // [most] these
   double *stiffness, *matrix; // [3 most][3 most]
   double *way, *move, *push;  // [3 most]

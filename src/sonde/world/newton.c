@@ -306,7 +306,9 @@ static bool iterate(sonde_state *state, sonde_batches *body, const sonde_probe *
 
   bool open = solved && !last;
   double surprise2 = sonde_batches_advance_contact(state, body, open);
-  bool more = open && (is_bent(state, body, surprise2, now) || now->postponed);
+  // Rows without masses may be touched where nothing was: until the touched rows stay the same.
+  bool sought = body->tissue->compliance && probe && (now->number == 1 || body->response.changed);
+  bool more = open && (is_bent(state, body, surprise2, now) || now->postponed || sought);
   // The touched nodes' velocities where they are evaluated next, or at the end.
   for (uint32_t k = 0; k < state->touched_count; ++k) {
     uint32_t i = state->touched[k];
@@ -385,6 +387,7 @@ static void expect(sonde_state *state, sonde_batches *body) {
   }
 }
 
+enum { RESPONDING = 20 }; // Newton iterations of a body whose compliance is known
 bool sonde_batches_step(sonde_state *state, const sonde_probe *probe, sonde_pose pose,
                         const sonde_motion *motion) {
   sonde_batches *body = sonde_batches_of(state);
@@ -395,13 +398,19 @@ bool sonde_batches_step(sonde_state *state, const sonde_probe *probe, sonde_pose
   state->times = (sonde_stage_times){0};
   state->solver = (sonde_pcg_result){0};
   body->common.bytes_moved = 0;
-  // A body that follows the touched nodes at once has nothing to sleep.
+  // A body that follows the touched nodes at once has nothing to sleep, and is expected to stay.
   bool responds = body->tissue->compliance != NULL;
   for (uint32_t s = 0; responds && s < body->common.batch_count; ++s) wake(body, s);
   list_awake(body);
   expect(state, body);
+  for (uint32_t s = 0; responds && s < body->common.batch_count; ++s) {
+    for (int c = 0; c < 3; ++c) body->batch[s].ve[c] = (reals){0};
+    body->kernels->record(body, s);
+  }
   iteration now = {.number = 1};
   uint32_t most = state->def.implicitness > 0 ? state->def.newton_iterations : 1;
+  // No mass holds such a body back between two steps: the touched nodes have to be found in one.
+  if (responds && most > 1 && most < RESPONDING) most = RESPONDING;
   for (; iterate(state, body, probe, pose, motion, &now, now.number >= most); now.number++) {
     sonde_parts_accept(body);
     list_awake(body);

@@ -14,7 +14,7 @@
 // The stiffness between the touched rows while all others follow, found anew for other rows.
 static bool find_stiffness(sonde_response *r, const sonde_state *state, const sonde_batches *body) {
   uint32_t count = state->touched_count, n = 3 * count;
-  if (count == r->count && memcmp(r->row, state->touched, count * sizeof *r->row) == 0) return true;
+  if (!r->changed) return true;
   SONDE_ASSERT(count > 0 && count <= r->most);
   memcpy(r->row, state->touched, count * sizeof *r->row);
   for (uint32_t i = 0; i < n; ++i) {
@@ -101,6 +101,7 @@ bool sonde_batches_respond(sonde_state *state, sonde_batches *body, double *forc
   double scale = (double)tissue->gain *
                  (double)(step->stiffness_scale + tissue->damping_s * step->damping_scale);
   uint32_t count = state->touched_count, batches = body->common.batch_count;
+  r->changed = count != r->count || memcmp(r->row, state->touched, count * sizeof *r->row) != 0;
   if (count > r->most || !(scale > 0) || body->holds || body->region_push_count > 0) return false;
   if (count > 0 && !push_touched(r, state, body, scale)) return false;
 
@@ -111,6 +112,7 @@ bool sonde_batches_respond(sonde_state *state, sonde_batches *body, double *forc
     for (int c = 0; c < 3; ++c)
       at->x[c] = -back * (at->u[c] + (step->reach + tissue->damping_s) * at->ve[c]);
   }
+  if (count == 0) r->count = 0;
   sonde_vec3 sum = {0};
   *force2 = 0;
   for (uint32_t k = 0; k < 3 * count; ++k) {
