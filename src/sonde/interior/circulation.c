@@ -7,8 +7,10 @@
 static const double posture_mmhg[SONDE_POSTURE_COUNT] = {10, 25, 40};
 static const double rise_s = 0.6; // of a strain, and of its release
 // Specific weight of blood, and the share of its column that veins carry standing: 76 to 79 mmHg at
-// the ankle, 40 at the groin. The knee's share of the way from the hip to the ankle.
-static const double blood_pa_m = 1055 * 9.81, standing_share = 0.58, knee_share = 0.52;
+// the ankle, 40 at the groin. Groin and knee by their shares of a limb's axis, which begins a fifth
+// of the thigh above the hip and ends at the ankle.
+static const double blood_pa_m = 1055 * 9.81, standing_share = 0.58;
+static const double groin_share = 0.09, knee_share = 0.56;
 
 sonde_circulation sonde_circulation_default(void) {
   return (sonde_circulation){.posture = SONDE_POSTURE_SUPINE,
@@ -57,11 +59,12 @@ double sonde_hydrostatic_pressure(const sonde_interior *in, sonde_posture postur
   SONDE_ASSERT(in != NULL && posture < SONDE_POSTURE_COUNT);
   const sonde_model *m = in->model;
   if (m->bone_axis_m == NULL || posture == SONDE_POSTURE_SUPINE) return 0;
-  double hip = m->bone_axis_m[0].z, ankle = m->bone_axis_m[m->bone_axis_count - 1].z;
-  double below = s + in->origin.z - hip;
+  double top = m->bone_axis_m[0].z, length = m->bone_axis_m[m->bone_axis_count - 1].z - top;
+  double below = s + in->origin.z - top;
   if (posture == SONDE_POSTURE_SITTING)
-    return blood_pa_m * fmax(0, below - knee_share * (ankle - hip)); // the calf hangs
-  return blood_pa_m * below * (kind == SONDE_VESSEL_VEIN ? standing_share : 1);
+    return blood_pa_m * fmax(0, below - knee_share * length); // the calf hangs
+  return blood_pa_m * (below - groin_share * length) *
+         (kind == SONDE_VESSEL_VEIN ? standing_share : 1);
 }
 
 // The systolic and the dicrotic wave add up to a pulse that spans exactly 0..1 over a beat.

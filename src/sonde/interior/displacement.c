@@ -183,7 +183,7 @@ sonde_vec3 sonde_interior_rest_point(const sonde_interior *in, sonde_vec3 point)
   (void)sonde_interior_locate(in, point, &at);
   sonde_vec3 out = v_add(v_scale(in->e1, cos(at.theta)), v_scale(in->e2, sin(at.theta)));
   for (int k = 0; k < STARTS && left > good_enough_m; ++k) {
-    double r = in->bone_radius_m + (at.radius_m - in->bone_radius_m) * (k + 0.5) / STARTS;
+    double r = at.bone_m + (at.radius_m - at.bone_m) * (k + 0.5) / STARTS;
     sonde_vec3 start = v_madd(point, r - at.r, out);
     double got = invert(in, point, &start);
     if (got < left) left = got, rest = start;

@@ -24,6 +24,10 @@ static const double most_slide_strain = 0.05;
 
 // ---- update -------------------------------------------------------------------------------
 
+static double bone_of(const sonde_interior *in, uint32_t column) {
+  return in->bone ? (double)in->bone[column].radius_m : in->bone_radius_m;
+}
+
 void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
   SONDE_ASSERT(positions != NULL && in->surface != NULL);
   const uint32_t n = in->theta_count, count = n * in->s_count;
@@ -33,10 +37,14 @@ void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
     sonde_vec3 now = vec3(0, 0, 0);
     for (int v = 0; v < 3; ++v) now = v_madd(now, c->weight[v], positions[c->node[v]]);
     sonde_vec3 move = v_sub(now, c->rest_m);
-    double height = c->radius_m - in->bone_radius_m;
+    double height = c->radius_m - bone_of(in, k);
+    sonde_bend bend = sonde_bend_at(in, in->s_first_m + in->s_step_m * (k / n));
+    sonde_vec3 lean = v_madd(v_scale(in->e1, bend.slope_x), bend.slope_y, in->e2);
+    double along = v_dot(move, in->axis);
     in->field[k].inflow = (float)-v_dot(move, c->flux_normal);
-    in->field[k].slide_theta = (float)(height * v_dot(move, c->round));
-    in->field[k].slide_s = (float)(height * c->radius_m * v_dot(move, in->axis));
+    in->field[k].slide_theta =
+        (float)(height * (v_dot(move, c->round) - along * v_dot(lean, c->round)));
+    in->field[k].slide_s = (float)(height * c->radius_m * along);
   }
   // Divergence of the slide, and the source of the potential.
   const double cell = in->theta_step * in->s_step_m;
@@ -47,7 +55,7 @@ void sonde_interior_solve(sonde_interior *in, const sonde_vec3 *positions) {
     const sonde_column *c = &in->column[k];
     double a = row[(i + 1) % n].slide_theta - row[(i + n - 1) % n].slide_theta;
     double b = in->field[above * n + i].slide_s - in->field[below * n + i].slide_s;
-    double bound = most_slide_strain * (c->radius_m - in->bone_radius_m) * c->radius_m;
+    double bound = most_slide_strain * (c->radius_m - bone_of(in, k)) * c->radius_m;
     double ds = (above - below) * in->s_step_m;
     double spread = clamp(a / (2 * in->theta_step) + b / ds, -bound, bound);
     in->field[k].spread = (float)spread;
@@ -75,8 +83,10 @@ typedef struct polar {
 
 static polar to_polar(const sonde_interior *in, sonde_vec3 p) {
   sonde_vec3 d = v_sub(p, in->origin);
-  double x = v_dot(d, in->e1), y = v_dot(d, in->e2);
-  polar q = {.s = v_dot(d, in->axis), .r = sqrt(x * x + y * y)};
+  polar q = {.s = v_dot(d, in->axis)};
+  sonde_bend bend = sonde_bend_at(in, q.s);
+  double x = v_dot(d, in->e1) - bend.x, y = v_dot(d, in->e2) - bend.y;
+  q.r = sqrt(x * x + y * y);
   q.theta = atan2(y, x);
   double cosine = q.r > 0 ? x / q.r : 1, sine = q.r > 0 ? y / q.r : 0;
   q.e = v_add(v_scale(in->e1, cosine), v_scale(in->e2, sine));
@@ -107,11 +117,25 @@ static stencil stencil_at(const sonde_interior *in, double i, double j) {
   ((double)((st).w[0] * (st).f[0]->member + (st).w[1] * (st).f[1]->member +                        \
             (st).w[2] * (st).f[2]->member + (st).w[3] * (st).f[3]->member))
 
+// Radius of the bone and its slopes around and along, blended as the columns are.
+static sonde_column_bone bone_at(const sonde_interior *in, const stencil *st) {
+  sonde_column_bone sum = {0, 0, 0};
+  for (int k = 0; k < 4 && in->bone != NULL; ++k) {
+    const sonde_column_bone *b = &in->bone[st->f[k] - in->field];
+    sum.radius_m += st->w[k] * b->radius_m;
+    sum.slope_theta_m += st->w[k] * b->slope_theta_m, sum.slope_s += st->w[k] * b->slope_s;
+  }
+  return sum;
+}
+
 static sonde_vec3 column_field(const sonde_interior *in, polar q) {
   double i = q.theta / in->theta_step, j = (q.s - in->s_first_m) / in->s_step_m;
   stencil at = stencil_at(in, i, j);
   stencil mid_i = stencil_at(in, i - 0.5, j), mid_j = stencil_at(in, i, j - 0.5);
-  double radius = BLEND(at, radius_m), height = radius - in->bone_radius_m;
+  const sonde_column_bone bone = bone_at(in, &at);
+  const sonde_bend bend = sonde_bend_at(in, q.s);
+  double radius = BLEND(at, radius_m);
+  double height = radius - (in->bone ? (double)bone.radius_m : in->bone_radius_m);
   double z = clamp((radius - q.r) / height, 0, 1), r = radius - z * height;
   double rest_part = 1 - z;
   double g = rest_part * rest_part * (1 + 2 * z), slope = -6 * z * rest_part;
@@ -122,8 +146,11 @@ static sonde_vec3 column_field(const sonde_interior *in, polar q) {
   double density = 1 / (height * r);
   double out = -down / r +
                density * rest_part * (turn * BLEND(at, slope_theta_m) + shift * BLEND(at, slope_s));
+  out += density * z * (turn * (double)bone.slope_theta_m + shift * (double)bone.slope_s);
   sonde_vec3 u = v_scale(q.e, out);
   u = v_madd(u, density * turn * r, q.round);
+  u = v_madd(v_madd(u, density * shift * bend.slope_x, in->e1), density * shift * bend.slope_y,
+             in->e2);
   return v_madd(u, density * shift, in->axis);
 }
 
@@ -159,6 +186,7 @@ void sonde_interior_column(const sonde_interior *in, double theta, double s,
   at->r = at->radius_m = BLEND(st, radius_m);
   at->cosine = BLEND(st, cosine);
   at->fat_m = BLEND(st, fat_m), at->muscle_m = BLEND(st, muscle_m);
+  at->bone_m = in->bone ? (double)bone_at(in, &st).radius_m : in->bone_radius_m;
 }
 
 bool sonde_interior_locate(const sonde_interior *in, sonde_vec3 rest, sonde_column_point *at) {
@@ -173,7 +201,7 @@ bool sonde_interior_in_bone(const sonde_interior *in, sonde_vec3 rest,
                             const sonde_column_point *at) {
   const struct sonde_tissue_map *map = in->model->map;
   sonde_tissue_depths depths;
-  if (map == NULL) return at->r <= in->bone_radius_m;
+  if (map == NULL) return at->r <= at->bone_m;
   map->depths(map->self, rest, &depths);
   return depths.bone_m <= 0;
 }
@@ -183,7 +211,7 @@ bool sonde_interior_stress(const sonde_interior *in, sonde_vec3 rest, sonde_mat3
   sonde_column_point at;
   *stress = m_zero();
   if (!in->solid || !sonde_interior_locate(in, rest, &at)) return false;
-  if (at.depth_m < 0 || at.r <= in->bone_radius_m) return false;
+  if (at.depth_m < 0 || sonde_interior_in_bone(in, rest, &at)) return false;
   sonde_mat3 local, world_from_leg = m_columns(in->e1, in->e2, in->axis);
   if (!sonde_window_stress(in->live, at.theta, at.s, at.r, &local)) return false;
   *stress = m_mul(world_from_leg, m_mul(local, m_transpose(world_from_leg)));

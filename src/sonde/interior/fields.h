@@ -18,6 +18,7 @@ typedef struct sonde_fields {
   // Of the leg, rotated so that the window's middle is at angle 0: x, y and position along it =
   // first + columns times the offset from the corner.
   float_x4 first, turned[3];
+  double cosine, sine; // of the window's middle
   float theta[SONDE_WINDOW_THETA + 1], per_theta[SONDE_WINDOW_THETA];
   float s[SONDE_WINDOW_S], per_s[SONDE_WINDOW_S];
   uint32_t rows; // a bit per row of the window that is in the table

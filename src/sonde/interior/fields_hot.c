@@ -12,7 +12,8 @@ void sonde_fields_begin(sonde_fields *f, const sonde_interior *in, sonde_vec3 co
   f->interior = in, f->corner = corner, f->rows = 0;
   if (!in->solid) return;
   const sonde_window *w = in->live;
-  double cosine = cos(w->grid.footprint.theta), sine = sin(w->grid.footprint.theta);
+  const double cosine = cos(w->grid.footprint.theta), sine = sin(w->grid.footprint.theta);
+  f->cosine = cosine, f->sine = sine;
   sonde_vec3 x = v_madd(v_scale(in->e1, cosine), sine, in->e2);
   sonde_vec3 y = v_madd(v_scale(in->e2, cosine), -sine, in->e1), from = v_sub(corner, in->origin);
   f->first =
@@ -98,6 +99,12 @@ void sonde_fields_at(sonde_fields *f, uint32_t count, const float_x4 *rest, floa
     for (uint32_t i = 0; i < 4; ++i)
       at[i] = f->first + transform_point(f->turned, rest[k + (i < some ? i : 0)]);
     vtranspose_float_x4(at, leg);
+    for (uint32_t i = 0; i < 4 && f->interior->bend != NULL; ++i) {
+      const double s = f->interior->live->grid.footprint.s + (double)leg[2][i];
+      const sonde_bend bend = sonde_bend_at(f->interior, s);
+      leg[0][i] -= (float)(f->cosine * bend.x + f->sine * bend.y);
+      leg[1][i] -= (float)(f->cosine * bend.y - f->sine * bend.x);
+    }
     const float_x4 turn = vangle(leg[0], leg[1]), r = vsqrt(leg[0] * leg[0] + leg[1] * leg[1]);
     for (uint32_t i = 0; i < some; ++i) field[k + i] = field_of(f, turn[i], leg[2][i], r[i], cell);
   }

@@ -20,6 +20,7 @@ enum { SWEEPS = 400, FAST = 200, STEPS = 12 };
 
 static const double stiff_from = 0.55;   // compressive strain beyond which a layer stiffens
 static const double least_column = 0.12; // of a column's height at rest
+static const double most_more = 1e3;     // of what layers are shortened by, over the field's
 static const double least_volume = 0.06, aim = 0.10; // of a volume at rest
 static const double fast = 1.3;                      // relaxation of the first sweeps
 static const double most_change = 0.2;               // of an edge at rest
@@ -42,9 +43,10 @@ static double stretch_of(double strain, double *slope) {
 
 // Heights of a column's layers after stiffening. Under the linear field times `more` the layers
 // that are shortened give the column the height it has under the field itself, or the least one.
-static bool stiffen_column(sonde_vec3 *now, const sonde_vec3 *rest) {
+static bool stiffen_column(sonde_vec3 *now, const sonde_vec3 *rest, const double centre[2]) {
   double height[NL], strain[NL], most = 0, goal = 0, tall = 0, at = 0, slope;
-  double r = hypot(rest[0].x, rest[0].y), cosine = rest[0].x / r, sine = rest[0].y / r;
+  const double x = rest[0].x - centre[0], y = rest[0].y - centre[1];
+  const double r = hypot(x, y), cosine = x / r, sine = y / r;
   for (int l = 0; l + 1 < NL; ++l) {
     sonde_vec3 h = v_sub(rest[l], rest[l + 1]), d = v_sub(now[l], now[l + 1]);
     height[l] = h.x * cosine + h.y * sine;
@@ -62,6 +64,8 @@ static bool stiffen_column(sonde_vec3 *now, const sonde_vec3 *rest) {
       sum += height[l] * stretch_of(shorter ? more * strain[l] : strain[l], &slope);
       if (shorter) change += height[l] * slope * strain[l];
     }
+    // Layers that are stretched may be taller than the goal by themselves.
+    if (!(change < 0) || more > most_more) break;
     double step = (goal - sum) / change;
     more += step;
     if (fabs(step) < 1e-4 * more) break;
@@ -180,7 +184,7 @@ bool sonde_fold_repair_nodes(sonde_fold_repair *u, const sonde_grid *grid) {
     quiet = v_distance(u->now[n], grid->node[n]) < quiet_m;
   if (quiet) return false;
   for (uint32_t c = 0; c < NS * NT; ++c)
-    if (stiffen_column(u->now + c * NL, grid->node + c * NL)) moved = true;
+    if (stiffen_column(u->now + c * NL, grid->node + c * NL, grid->centre[c / NT])) moved = true;
   memset(u->pending, 0, sizeof u->pending);
   for (uint32_t h = 0; h < SONDE_GRID_HEXES; ++h)
     if (count_below(u, grid, h, least_volume, &of, &least) > 0) mark_pending(u, h), folded = true;

@@ -30,6 +30,7 @@ typedef struct sonde_grid {
   double theta[SONDE_WINDOW_THETA +
                1]; // offsets from footprint.theta, ascending; the last is the first
   double s[SONDE_WINDOW_S];
+  double centre[SONDE_WINDOW_S][2]; // where the columns of each row start: along e1, e2
   float radius[SONDE_WINDOW_S * SONDE_WINDOW_THETA][SONDE_WINDOW_LEVELS];
   sonde_vec3 node[SONDE_WINDOW_NODES]; // at rest, leg frame: e1, e2, along the axis
   // Of the corners of each element: one over the volume that the three edges there span at rest.

@@ -76,14 +76,16 @@ void sonde_grid_begin(sonde_grid *g, const sonde_interior *in, sonde_footprint f
   for (uint32_t c = 0; c < NS * NT; ++c) {
     const double theta = footprint.theta + g->theta[c % NT], s = g->s[c / NT];
     sonde_interior_column(in, theta, s, &at);
-    const double height = at.radius_m - in->bone_radius_m;
-    const double fat = clamp(at.muscle_m / at.cosine, 2.5e-3, 0.6 * height);
+    const sonde_bend bend = sonde_bend_at(in, s);
+    const double height = at.radius_m - at.bone_m, most = 0.6 * height;
+    const double fat = clamp(at.muscle_m / at.cosine, fmin(2.5e-3, most), most);
+    g->centre[c / NT][0] = bend.x, g->centre[c / NT][1] = bend.y;
     for (uint32_t l = 0; l < NL; ++l) {
       double depth = l <= SONDE_WINDOW_FAT ? fat * l / SONDE_WINDOW_FAT
                                            : fat + (height - fat) * muscle_level[l];
       double r = at.radius_m - depth;
       g->radius[c][l] = (float)r;
-      g->node[c * NL + l] = vec3(r * cos(theta), r * sin(theta), s);
+      g->node[c * NL + l] = vec3(bend.x + r * cos(theta), bend.y + r * sin(theta), s);
     }
   }
 

@@ -42,6 +42,8 @@ void sonde_interior_destroy(sonde_interior *interior) {
   sonde_surface_index_destroy(interior->skin);
   sonde_direct_destroy(interior->surface);
   sonde_free(interior->column);
+  sonde_free(interior->bend);
+  sonde_free(interior->bone);
   sonde_free(interior->field);
   sonde_free(interior->column_grid);
   sonde_free(interior->reached);

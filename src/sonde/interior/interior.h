@@ -2,6 +2,7 @@
 //
 // Columns run from the femur's axis straight out to the skin. A point has coordinates
 // (theta, s, zeta): angle about the axis, position along it, depth fraction 0 (skin) .. 1 (bone).
+// In a limb the columns of a plane of constant s run from where the bones' middle crosses it.
 #ifndef SONDE_SRC_INTERIOR_H
 #define SONDE_SRC_INTERIOR_H
 
@@ -36,10 +37,22 @@ typedef struct sonde_column_field {
   float fat_m, muscle_m, cosine;          // layer depths; cosine between column and skin normal
 } sonde_column_field;
 
+// Where the middle of a limb's bones crosses the plane of constant s, from the axis: m along e1 and
+// e2, and its slope along s.
+typedef struct sonde_bend {
+  double x, y, slope_x, slope_y;
+} sonde_bend;
+
+// A limb's bone on a column: outer face of the outermost bone, from the column's start.
+typedef struct sonde_column_bone {
+  float radius_m, slope_theta_m, slope_s;
+} sonde_column_bone;
+
 // Where a point lies in the column table.
 typedef struct sonde_column_point {
   double theta, s, r;
   double radius_m, depth_m; // of the column's skin; depth along the skin normal, < 0 outside
+  double bone_m;            // radius of the bone
   double fat_m, muscle_m;
   double cosine; // between column and skin normal: depth over distance along the column
 } sonde_column_point;
@@ -91,7 +104,9 @@ struct sonde_interior {
   const sonde_model *model;
   sonde_surface_index *skin;
   sonde_vec3 origin, axis, e1, e2; // femur axis and the directions of theta = 0 and pi/2
-  double bone_radius_m;
+  double bone_radius_m;            // of a thigh's femur; of a limb's shafts, about
+  sonde_bend *bend;                // [s_count] NULL: the columns start on the axis
+  sonde_column_bone *bone;         // as column; NULL: bone_radius_m everywhere
   double s_first_m, s_step_m, s_low_m, s_high_m; // table rows; ends of the leg
   double theta_step;
   uint32_t theta_count, s_count;
@@ -122,6 +137,15 @@ struct sonde_interior {
   uint64_t tick;
 };
 
+// Where the columns start at row s; between two rows of the table on a straight line. @thread any
+static inline sonde_bend sonde_bend_at(const sonde_interior *in, double s_m) {
+  if (in->bend == NULL) return (sonde_bend){0, 0, 0, 0};
+  const double last = in->s_count - 1, j = clamp((s_m - in->s_first_m) / in->s_step_m, 0, last);
+  const double low = fmin(floor(j), last - 1), t = j - low;
+  const sonde_bend *a = &in->bend[(size_t)low], *b = a + 1;
+  return (sonde_bend){a->x + t * (b->x - a->x), a->y + t * (b->y - a->y),
+                      (b->x - a->x) / in->s_step_m, (b->y - a->y) / in->s_step_m};
+}
 // Facts of the column at angle theta and row s; r and depth_m of its skin. @thread any
 void sonde_interior_column(const sonde_interior *interior, double theta, double s,
                            sonde_column_point *at);

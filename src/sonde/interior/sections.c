@@ -89,7 +89,7 @@ static sonde_status resample(sonde_interior *in, uint32_t which, const sonde_ves
     sonde_column_point at;
     (void)sonde_interior_locate(in, one.rest_m, &at);
     one.s_m = at.s, one.along_m = sonde_vessel_along(in, which, one.rest_m, at.s);
-    one.tissue_m = at.radius_m - in->bone_radius_m;
+    one.tissue_m = at.radius_m - at.bone_m;
     if (!(one.depth_m > 0)) one.depth_m = at.depth_m;
     double advance = kept > 0 ? one.along_m - section[kept - 1].along_m : INFINITY;
     if (which < 2 && !(advance > 0))
@@ -264,7 +264,9 @@ static void move_line(const sonde_interior *in, sonde_vessel *line, double turn,
     const double theta = at.theta + turn, s = at.s;
     sonde_interior_column(in, theta, s, &at);
     double r = at.radius_m - depth / at.cosine;
-    sonde_vec3 p = v_madd(in->origin, s, in->axis);
+    const sonde_bend bend = sonde_bend_at(in, s);
+    sonde_vec3 p = v_madd(v_madd(in->origin, bend.x, in->e1), bend.y, in->e2);
+    p = v_madd(p, s, in->axis);
     line->point[i].centre_m = v_madd(v_madd(p, r * cos(theta), in->e1), r * sin(theta), in->e2);
     line->point[i].depth_m = depth;
   }
@@ -287,7 +289,7 @@ sonde_status sonde_interior_set_vein_depth(sonde_interior *in, sonde_vec3 below_
   sonde_vessel vein = in->model->vein, artery = in->model->artery;
   sonde_column_point at;
   bool within = sonde_interior_locate(in, below_m, &at);
-  double deepest = (at.radius_m - in->bone_radius_m) * at.cosine - 8e-3;
+  double deepest = (at.radius_m - at.bone_m) * at.cosine - 8e-3;
   if (!within || vein.count < 2)
     return sonde_fail(error, SONDE_ARGUMENT, "expected a point of a leg with a vein");
   if (!(depth_m >= 8e-3) || !(depth_m <= deepest))

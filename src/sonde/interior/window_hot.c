@@ -24,8 +24,10 @@ static void add_touched(sonde_window *w, const sonde_interior *in, sonde_vec3 re
   sonde_vec3 d = v_sub(rest, in->origin);
   const uint32_t first = SONDE_WINDOW_NEAR_FIRST;
   sonde_grid_cell c;
-  double theta = atan2(v_dot(d, in->e2), v_dot(d, in->e1));
-  if (!sonde_grid_columns(&w->grid, theta, v_dot(d, in->axis), &c)) return;
+  const double s = v_dot(d, in->axis);
+  const sonde_bend bend = sonde_bend_at(in, s);
+  double theta = atan2(v_dot(d, in->e2) - bend.y, v_dot(d, in->e1) - bend.x);
+  if (!sonde_grid_columns(&w->grid, theta, s, &c)) return;
   if (c.i + 1 >= SONDE_WINDOW_NEAR_T || c.j < first || c.j + 1 >= first + SONDE_WINDOW_NEAR_S)
     return;
   if (w->touched_count == SONDE_WINDOW_TOUCHED) return;
