@@ -159,7 +159,11 @@ SONDE_API uint32_t sonde_limb_clot_at(const sonde_limb *limb, const sonde_limb_c
 typedef enum sonde_limb_position {
   SONDE_LIMB_SUPINE_TURNED, /**< head up 10-20 degrees, hip turned out 30, knee bent 20-30 */
   SONDE_LIMB_PRONE_BENT,    /**< prone or on the side, knee bent 20-30 */
-  SONDE_LIMB_SITTING        /**< leg hangs */
+  SONDE_LIMB_SITTING,       /**< leg hangs */
+  SONDE_LIMB_SUPINE,        /**< leg straight: the limb as it is made */
+  SONDE_LIMB_PRONE,
+  SONDE_LIMB_STANDING,
+  SONDE_LIMB_POSITIONS
 } sonde_limb_position;
 
 /** A station of an examination on one limb. */

@@ -38,6 +38,7 @@
 #include "sonde/files.h"
 #include "sonde/limb.h"
 #include "sonde/limb_model.h"
+#include "sonde/limb_pose.h"
 #include "sonde/limb_vessels.h"
 #include "sonde/exam.h"
 #include "sonde/exam_journal.h"

@@ -5,7 +5,9 @@
 #include "../fixture.h"
 #include "sonde/limb.h"
 
+#ifndef DEGREE
 #define DEGREE (SONDE_PI / 180)
+#endif
 
 static inline sonde_limb *make_limb(uint64_t seed, sonde_sex sex, double bmi,
                                     sonde_limb_side side) {
