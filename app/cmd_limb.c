@@ -1,4 +1,6 @@
-// sonde limb: a lower limb from a body and a seed: its table, labelled sections, a view.
+// sonde limb: a lower limb from a body and a seed: its table, labelled sections, a view, a walk
+// along the vein, stations; at rest or in a position.
+#include "limb_film.h"
 #include "options.h"
 
 #include <assert.h>
@@ -9,27 +11,36 @@
 static const char VERB[] = "limb";
 
 typedef struct options {
-  const char *atlas, *skin, *levels, *model;
-  bool json;
+  const char *atlas, *skin, *levels, *model, *film;
+  bool json, stations;
   long seed;
-  int sex, side; // -1: drawn, right
+  int sex, side, position; // -1: drawn, right, at rest
   sonde_limb_body known;
 } options;
 
 static void prepare(void *to) {
-  *(options *)to = (options){.seed = 1, .sex = -1, .side = -1, .known = sonde_limb_unknown()};
+  *(options *)to =
+      (options){.seed = 1, .sex = -1, .side = -1, .position = -1, .known = sonde_limb_unknown()};
 }
 
 static const char *const SEXES[] = {"female", "male", NULL};
 static const char *const SIDES[] = {"right", "left", NULL};
+// In the order of sonde_limb_position.
+static const char *const POSITIONS[] = {"supine-turned", "prone-bent", "sitting", "supine",
+                                        "prone",         "standing",   NULL};
 
 static const app_option TABLE[] = {
     OPT_INTEGER(seed, "seed", "N", 0, 4294967295, "of what is drawn"),
     OPT_WORD(sex, "sex", "SEX", SEXES, "sex; default drawn"),
     OPT_WORD(side, "side", "SIDE", SIDES, "side; a left limb is the mirror of a right one"),
-    OPT_TEXT(atlas, "atlas", "DIR", "write labelled sections and a view as SVG into a directory"),
+    OPT_WORD(position, "position", "NAME", POSITIONS,
+             "position of the view, the skin, the film and the stations; default at rest"),
+    OPT_FLAG(stations, "stations", "list the stations of an examination too"),
+    OPT_TEXT(atlas, "atlas", "DIR",
+             "write labelled sections and a view as SVG, and a table, into a directory"),
     OPT_TEXT(levels, "levels", "L,L...",
              "levels of the sections: 0 hip, 1 knee joint line, 2 ankle; default -0.05 to 1.9"),
+    OPT_OUTPUT(film, "film", "FILE", "write a walk along the main vein as an animated PNG"),
     OPT_OUTPUT(skin, "skin", "FILE", "write the skin as .ply, .obj or .stl, mm"),
     OPT_OUTPUT(model, "model", "FILE",
                "write the limb as a model (.sonde) that can be pressed and imaged"),
@@ -79,9 +90,26 @@ static int check(void *from) {
   return APP_OK;
 }
 
+static void put_point(const char *key, sonde_vec3 p, double unit) {
+  app_json_array(key);
+  app_json_real(NULL, p.x * unit);
+  app_json_real(NULL, p.y * unit);
+  app_json_real(NULL, p.z * unit);
+  app_json_close();
+}
+
+// Stations in the position asked for, or at rest.
+static void find_stations(const sonde_limb *limb, const sonde_limb_pose *pose,
+                          sonde_limb_station station[SONDE_LIMB_STATIONS]) {
+  if (pose)
+    sonde_limb_pose_stations(pose, station);
+  else
+    sonde_limb_stations(limb, station);
+}
+
 static const double GIRTHS[] = {0.12, 0.25, 0.5, 0.75, 0.88, 1, 1.15, 1.28, 1.5, 1.75, 1.86};
 
-static void print_json(const options *a, const sonde_limb *limb) {
+static void print_json(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose) {
   sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
@@ -112,13 +140,39 @@ static void print_json(const options *a, const sonde_limb *limb) {
     app_json_close();
   }
   app_json_close();
+  if (pose) app_json_text("position", POSITIONS[a->position]);
+  if (a->stations) {
+    sonde_limb_station station[SONDE_LIMB_STATIONS];
+    find_stations(limb, pose, station);
+    app_json_array("stations");
+    for (uint32_t k = 0; k < SONDE_LIMB_STATIONS; ++k) {
+      const sonde_limb_station *s = &station[k];
+      app_json_object(NULL);
+      app_json_text("name", s->name);
+      app_json_text("view", s->view);
+      app_json_text("text", s->text);
+      app_json_text("position", POSITIONS[s->position]);
+      app_json_array("veins");
+      for (uint32_t i = 0; i < s->veins; ++i)
+        app_json_text(NULL, sonde_limb_vessel_get(limb, s->vein[i]).name);
+      app_json_close();
+      app_json("level:%g depth_mm:%g force_low_n:%g force_high_n:%g", s->level, s->depth_m * 1e3,
+               s->force_n[0], s->force_n[1]);
+      put_point("skin_mm", s->skin_m, 1e3);
+      put_point("normal", s->normal, 1);
+      put_point("target_mm", s->target_m, 1e3);
+      app_json_close();
+    }
+    app_json_close();
+  }
+  if (a->film) app_json_text("film", a->film);
   if (a->atlas) app_json_text("atlas", a->atlas);
   if (a->skin) app_json_text("skin", a->skin);
   if (a->model) app_json_text("model", a->model);
   app_json_end();
 }
 
-static void print_text(const options *a, const sonde_limb *limb) {
+static void print_text(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose) {
   sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
@@ -140,6 +194,58 @@ static void print_text(const options *a, const sonde_limb *limb) {
     volume += m.volume_m3, rule += m.rule_m3;
   }
   printf("%-30s %10.0f %9.0f\n", "all", volume * 1e6, rule * 1e6);
+  if (!a->stations) return;
+  sonde_limb_station station[SONDE_LIMB_STATIONS];
+  find_stations(limb, pose, station);
+  printf("\n%-26s %-4s %-14s %5s %8s %11s  %s\n", "station", "view", "position", "level",
+         "depth mm", "force N", "veins");
+  for (uint32_t k = 0; k < SONDE_LIMB_STATIONS; ++k) {
+    const sonde_limb_station *s = &station[k];
+    printf("%-26s %-4s %-14s %5.2f %8.0f %5.1f-%5.1f  ", s->name, s->view, POSITIONS[s->position],
+           s->level, s->depth_m * 1e3, s->force_n[0], s->force_n[1]);
+    for (uint32_t i = 0; i < s->veins; ++i)
+      printf("%s%s", i ? ", " : "", sonde_limb_vessel_get(limb, s->vein[i]).name);
+    printf("\n");
+  }
+}
+
+// The table of the leg: bones' and muscles' measures, every vessel, the stations.
+static sonde_status write_table(const sonde_limb *limb, const sonde_limb_pose *pose,
+                                const char *path, sonde_error *error) {
+  sonde_file *file = NULL;
+  sonde_status status = sonde_file_create(path, &file, error);
+  if (status) return status;
+  sonde_file_printf(file, "part,name,from_level,to_level,length_mm,diameter_mm,volume_cm3,"
+                          "depth_mm\n");
+  for (uint32_t k = 0; k < sonde_limb_muscle_count(); ++k) {
+    sonde_limb_muscle m = sonde_limb_muscle_at(limb, k);
+    sonde_file_printf(file, "muscle,\"%s\",,,,,%.1f,\n", m.name, m.volume_m3 * 1e6);
+  }
+  static const char *const KINDS[] = {"artery", "deep vein", "superficial vein", "perforator",
+                                      "muscle vein"};
+  for (uint32_t k = 0; k < sonde_limb_vessel_count(limb); ++k) {
+    sonde_limb_vessel v = sonde_limb_vessel_get(limb, k);
+    double level[2], angle, f, radius = 0;
+    for (int end = 0; end < 2; ++end) {
+      sonde_vec3 p = sonde_limb_vessel_place(limb, k, end * v.length_m).centre_m;
+      sonde_limb_polar(limb, p, &level[end], &angle, &f);
+    }
+    for (int n = 0; n < 9; ++n) { // mean over the branch
+      double arc = (n + 0.5) / 9 * v.length_m;
+      radius += (pose ? sonde_limb_pose_place(pose, k, arc) : sonde_limb_vessel_place(limb, k, arc))
+                    .radius_m /
+                9;
+    }
+    double length = pose ? sonde_limb_pose_length(pose, k) : v.length_m;
+    sonde_file_printf(file, "%s,\"%s\",%.3f,%.3f,%.1f,%.2f,,\n", KINDS[v.kind], v.name, level[0],
+                      level[1], length * 1e3, 2e3 * radius);
+  }
+  sonde_limb_station station[SONDE_LIMB_STATIONS];
+  find_stations(limb, pose, station);
+  for (uint32_t k = 0; k < SONDE_LIMB_STATIONS; ++k)
+    sonde_file_printf(file, "station,\"%s\",%.3f,%.3f,,,,%.1f\n", station[k].name, station[k].level,
+                      station[k].level, station[k].depth_m * 1e3);
+  return sonde_file_commit(file, error);
 }
 
 static int run(void *from) {
@@ -147,11 +253,16 @@ static int run(void *from) {
   assert(a->seed >= 0);
   sonde_limb_body body;
   sonde_limb *limb = NULL;
+  sonde_limb_pose *pose = NULL;
   sonde_mesh skin = {0};
   sonde_error error = {0};
   app_progress_begin("making the limb");
   sonde_status status = sonde_limb_draw(&a->known, (uint64_t)a->seed, &body, &error);
   if (!status) status = sonde_limb_create(&body, &limb, &error);
+  if (!status && a->position >= 0) {
+    sonde_limb_setting setting = sonde_limb_setting_usual((sonde_limb_position)a->position);
+    status = sonde_limb_pose_create(limb, &setting, &pose, &error);
+  }
   // The atlas: sections at the levels, then the view.
   double level[MOST_LEVELS];
   uint32_t count = read_levels(a->levels, level);
@@ -163,18 +274,26 @@ static int run(void *from) {
   }
   if (!status && a->atlas) {
     snprintf(path, sizeof path, "%s/view.svg", a->atlas);
-    status = sonde_limb_view_svg(limb, path, &error);
+    status = sonde_limb_view_svg(limb, pose, path, &error);
   }
+  if (!status && a->atlas) {
+    snprintf(path, sizeof path, "%s/table.csv", a->atlas);
+    status = write_table(limb, pose, path, &error);
+  }
+  if (!status && a->film) status = limb_film_write(limb, pose, a->film, &error);
   sonde_model *model = NULL;
   const sonde_limb_model_def def = sonde_limb_model_def_default();
   if (!status && a->model) status = sonde_limb_model(&body, &def, &model, &error);
   if (!status && a->model) status = sonde_model_save(model, a->model, &error);
   sonde_model_destroy(model);
-  if (!status && a->skin) status = sonde_limb_skin(limb, 0.004, &skin, &error);
+  if (!status && a->skin)
+    status = pose ? sonde_limb_pose_skin(pose, 0.004, &skin, &error)
+                  : sonde_limb_skin(limb, 0.004, &skin, &error);
   if (!status && a->skin) status = sonde_mesh_save(a->skin, 1e-3, &skin, &error);
   app_progress_end();
-  if (!status) (a->json ? print_json : print_text)(a, limb);
+  if (!status) (a->json ? print_json : print_text)(a, limb, pose);
   sonde_mesh_clear(&skin);
+  sonde_limb_pose_destroy(pose);
   sonde_limb_destroy(limb);
   return status ? app_fail(VERB, &error) : APP_OK;
 }

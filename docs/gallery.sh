@@ -49,3 +49,10 @@ shoot webs_pressed "$@" --force-n 8
 # Sections of a whole limb.
 "$sonde" limb --seed 3 --levels 0.15,0.5,1.5 --atlas "$models/limb" >"$models/table"
 for level in 0.15 0.50 1.50; do cp "$models/limb/section_+$level.svg" "$out/limb_$level.svg"; done
+
+# Three limbs in layers, and a walk along a vein.
+"$sonde" limb --seed 3 --atlas "$models/woman" >"$models/table"
+"$sonde" limb --seed 8 --sex male --bmi 22 --atlas "$models/man" >"$models/table"
+"$sonde" limb --seed 11 --sex female --bmi 36 --side left --atlas "$models/heavy" >"$models/table"
+for leg in woman man heavy; do cp "$models/$leg/view.svg" "$out/limb_view_$leg.svg"; done
+"$sonde" limb --seed 3 --position supine-turned --film "$out/limb_walk.png" >"$models/table"

@@ -16,6 +16,19 @@ extern "C" {
 SONDE_API sonde_status sonde_image_save_png(const sonde_image *image, const char *path,
                                             sonde_error *error);
 
+/** Pictures of one size and few colours; all memory is the caller's. */
+typedef struct sonde_colours {
+  uint32_t width, height, frames;
+  double frame_s;              /**< how long a frame is shown, up to 65 s */
+  uint32_t colours;            /**< 1 to 256 */
+  const uint8_t (*palette)[3]; /**< [colours] red, green, blue */
+  const uint8_t *pixels;       /**< [frames*height*width] below colours */
+} sonde_colours;
+/** Writes a PNG atomically: an animated one (APNG, which browsers play and other programs show the
+ * first frame of) when there are several frames. @return MEMORY, IO, DISK @thread owner */
+SONDE_API sonde_status sonde_colours_save_png(const sonde_colours *picture, const char *path,
+                                              sonde_error *error);
+
 /**
  * Writes a report atomically: one HTML file that holds its data and the script that draws them
  * (web/src/report), opens from disk and loads nothing.

@@ -204,10 +204,6 @@ SONDE_API const sonde_limb_body *sonde_limb_body_of(const sonde_limb *limb);
 /** Draws the labelled section at a level, -0.2 to 2, as SVG, seen from the feet. @thread owner */
 SONDE_API sonde_status sonde_limb_section_svg(const sonde_limb *limb, double level,
                                               const char *path, sonde_error *error);
-/** Draws the limb from the front and from the medial side: bones, and the skin as a veil.
- * @thread owner */
-SONDE_API sonde_status sonde_limb_view_svg(const sonde_limb *limb, const char *path,
-                                           sonde_error *error);
 
 #ifdef __cplusplus
 }

@@ -107,6 +107,12 @@ SONDE_API sonde_status sonde_limb_pose_bone_mesh(const sonde_limb_pose *pose, so
                                                  double edge_m, sonde_mesh *mesh,
                                                  sonde_error *error);
 
+/** Draws the limb in layers as an SVG with pictures in it: muscles, vessels and nerves under
+ * see-through muscles, superficial veins; from the front, the medial side and behind, with names.
+ * @param pose of the limb, NULL: at rest @thread owner */
+SONDE_API sonde_status sonde_limb_view_svg(const sonde_limb *limb, const sonde_limb_pose *pose,
+                                           const char *path, sonde_error *error);
+
 #ifdef __cplusplus
 }
 #endif

@@ -10,6 +10,16 @@
 SONDE_LINK sonde_status sonde_png_encode(const sonde_image *image, uint8_t **bytes, size_t *count,
                                          sonde_error *error);
 
+// A PNG of indexed colours, animated when it has several frames. *bytes [*count] freed by
+// sonde_free.
+SONDE_LINK sonde_status sonde_colours_encode(const sonde_colours *picture, uint8_t **bytes,
+                                             size_t *count, sonde_error *error);
+
+// The first frame stored within an SVG drawing, stretched to a box. @return MEMORY or IO
+SONDE_LINK sonde_status sonde_svg_put_colours(sonde_file *file, double x, double y, double width,
+                                              double height, const sonde_colours *picture,
+                                              sonde_error *error);
+
 // Bytes as text (RFC 4648, section 4). @return freed by sonde_free(); NULL: out of memory
 SONDE_LINK char *sonde_base64_encode(const uint8_t *bytes, size_t count);
 

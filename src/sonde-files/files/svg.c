@@ -90,27 +90,41 @@ void sonde_svg_put_text(sonde_file *file, double x, double y, const char *look, 
   sonde_file_printf(file, "</text>\n");
 }
 
+// Bytes of a PNG, which are freed, as a part of the drawing.
+static sonde_status put_png(sonde_file *file, double x, double y, double width, double height,
+                            uint8_t *bytes, size_t count, sonde_error *error) {
+  SONDE_ASSERT(file && bytes && width > 0 && height > 0);
+  char *text = sonde_base64_encode(bytes, count);
+  sonde_free(bytes);
+  if (!text) return sonde_fail_memory(error);
+  sonde_file_printf(file, "<image");
+  put_attribute(file, "x", x);
+  put_attribute(file, "y", y);
+  put_attribute(file, "width", width);
+  put_attribute(file, "height", height);
+  sonde_file_printf(file, " preserveAspectRatio='none' href='data:image/png;base64,");
+  sonde_file_write(file, text, strlen(text));
+  sonde_file_printf(file, "'/>\n");
+  sonde_free(text);
+  return SONDE_OK;
+}
+
 sonde_status sonde_svg_put_image(sonde_file *file, double x, double y, double width, double height,
                                  const sonde_image *image, sonde_error *error) {
-  SONDE_ASSERT(file && image && image->pixels && width > 0 && height > 0);
+  SONDE_ASSERT(image && image->pixels);
   uint8_t *bytes = NULL;
   size_t count = 0;
   sonde_status status = sonde_png_encode(image, &bytes, &count, error);
-  char *text = status ? NULL : sonde_base64_encode(bytes, count);
-  if (!status && !text) status = sonde_fail_memory(error);
-  if (!status) {
-    sonde_file_printf(file, "<image");
-    put_attribute(file, "x", x);
-    put_attribute(file, "y", y);
-    put_attribute(file, "width", width);
-    put_attribute(file, "height", height);
-    sonde_file_printf(file, " preserveAspectRatio='none' href='data:image/png;base64,");
-    sonde_file_write(file, text, strlen(text));
-    sonde_file_printf(file, "'/>\n");
-  }
-  sonde_free(text);
-  sonde_free(bytes);
-  return status;
+  return status ? status : put_png(file, x, y, width, height, bytes, count, error);
+}
+
+sonde_status sonde_svg_put_colours(sonde_file *file, double x, double y, double width,
+                                   double height, const sonde_colours *picture,
+                                   sonde_error *error) {
+  uint8_t *bytes = NULL;
+  size_t count = 0;
+  sonde_status status = sonde_colours_encode(picture, &bytes, &count, error);
+  return status ? status : put_png(file, x, y, width, height, bytes, count, error);
 }
 
 sonde_status sonde_svg_end(sonde_file *file, sonde_error *error) {
