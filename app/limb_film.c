@@ -61,22 +61,6 @@ static const uint8_t PALETTE[COLOURS][3] = {[WHITE] = {255, 255, 255},
                                             {192, 90, 90},
                                             [CAPTION] = {20, 20, 20}};
 
-static uint8_t colour_of(const sonde_limb *limb, sonde_limb_label at) {
-  static const uint8_t PLAIN[SONDE_LIMB_TISSUES] = {
-      [SONDE_LIMB_OUTSIDE] = WHITE, [SONDE_LIMB_SKIN] = SKIN,
-      [SONDE_LIMB_FAT] = FAT,       [SONDE_LIMB_SUPERFICIAL_FASCIA] = SHEET,
-      [SONDE_LIMB_FASCIA] = SHEET,  [SONDE_LIMB_SEPTUM] = SHEET,
-      [SONDE_LIMB_TENDON] = TENDON, [SONDE_LIMB_SHEATH] = SHEATH,
-      [SONDE_LIMB_NODE] = NODE,     [SONDE_LIMB_NERVE] = NERVE,
-      [SONDE_LIMB_BONE] = BONE};
-  if (at.tissue == SONDE_LIMB_MUSCLE) return (uint8_t)(MUSCLE + (at.index * 5 + 3) % 8);
-  if (at.tissue == SONDE_LIMB_FAT && at.index == 1) return DEEP_FAT;
-  if (at.tissue != SONDE_LIMB_WALL && at.tissue != SONDE_LIMB_LUMEN) return PLAIN[at.tissue];
-  bool artery = sonde_limb_vessel_get(limb, at.index).kind == SONDE_LIMB_ARTERY;
-  bool wall = at.tissue == SONDE_LIMB_WALL;
-  return artery ? (wall ? ARTERY_WALL : ARTERY) : (wall ? VEIN_WALL : VEIN);
-}
-
 typedef struct stop {
   const char *name;
   sonde_vec3 section; // middle of the limb at the vein's level
@@ -109,13 +93,28 @@ static uint32_t plan_walk(const sonde_limb *limb, const sonde_limb_pose *pose, s
 
 static void draw_section(const sonde_limb *limb, const sonde_limb_pose *pose, sonde_vec3 middle,
                          sonde_vec3 right, sonde_vec3 up, uint8_t *frame) {
+  static const uint8_t PLAIN[SONDE_LIMB_TISSUES] = {
+      [SONDE_LIMB_OUTSIDE] = WHITE, [SONDE_LIMB_SKIN] = SKIN,
+      [SONDE_LIMB_FAT] = FAT,       [SONDE_LIMB_SUPERFICIAL_FASCIA] = SHEET,
+      [SONDE_LIMB_FASCIA] = SHEET,  [SONDE_LIMB_SEPTUM] = SHEET,
+      [SONDE_LIMB_TENDON] = TENDON, [SONDE_LIMB_SHEATH] = SHEATH,
+      [SONDE_LIMB_NODE] = NODE,     [SONDE_LIMB_NERVE] = NERVE,
+      [SONDE_LIMB_BONE] = BONE};
   for (int j = 0; j < SIDE; ++j)
     for (int i = 0; i < SIDE; ++i) {
       double x = (i + 0.5 - SIDE / 2) * PIXEL_M, y = (SIDE / 2 - j - 0.5) * PIXEL_M;
       sonde_vec3 p = {middle.x + x * right.x + y * up.x, middle.y + x * right.y + y * up.y,
                       middle.z + x * right.z + y * up.z};
       sonde_limb_label at = pose ? sonde_limb_pose_at(pose, p) : sonde_limb_at(limb, p);
-      frame[j * WIDTH + i] = colour_of(limb, at);
+      uint8_t colour = PLAIN[at.tissue];
+      bool wall = at.tissue == SONDE_LIMB_WALL;
+      if (at.tissue == SONDE_LIMB_MUSCLE) colour = (uint8_t)(MUSCLE + (at.index * 5 + 3) % 8);
+      if (at.tissue == SONDE_LIMB_FAT && at.index == 1) colour = DEEP_FAT;
+      if (wall || at.tissue == SONDE_LIMB_LUMEN) {
+        bool artery = sonde_limb_vessel_get(limb, at.index).kind == SONDE_LIMB_ARTERY;
+        colour = artery ? (wall ? ARTERY_WALL : ARTERY) : (wall ? VEIN_WALL : VEIN);
+      }
+      frame[j * WIDTH + i] = colour;
     }
 }
 

@@ -172,29 +172,6 @@ static sonde_status lay_bed(sonde_limb_pose *pose, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Least determinant of the map over the limb; where it is not well above 0 the tissue folds.
-static sonde_status check_folds(const sonde_limb_pose *pose, sonde_error *error) {
-  const double between = 0.015; // tissue that the bones of a joint squeeze is not asked
-  double least = INFINITY, at = 0;
-  for (double level = LIMB_TOP; level <= 2; level += 0.02)
-    for (int k = 0; k < 24; ++k)
-      for (int j = 1; j <= 3; ++j) {
-        double angle = 2 * SONDE_PI * k / 24;
-        double r = j / 3.0 * limb_skin_radius(pose->limb, level, angle);
-        sonde_vec3 p = v_madd(limb_centre(pose->limb, level), r, vec3(sin(angle), cos(angle), 0));
-        const double xyz[3] = {p.x, p.y, p.z};
-        if (limb_bone_distance(pose->limb, xyz, NULL) < between) continue;
-        sonde_mat3 g = limb_pose_gradient(pose, p);
-        double det = v_dot(m_column(&g, 0), v_cross(m_column(&g, 1), m_column(&g, 2)));
-        if (det < least) least = det, at = level;
-      }
-  if (least > 0.02) return SONDE_OK;
-  return sonde_fail(error, SONDE_ARGUMENT,
-                    "the tissue would fold at level %.2f in this position (volume changes by %.2f, "
-                    "expected above 0): bend hip or knee less",
-                    at, least);
-}
-
 sonde_status sonde_limb_pose_create(const sonde_limb *limb, const sonde_limb_setting *setting,
                                     sonde_limb_pose **out, sonde_error *error) {
   SONDE_ASSERT(limb && limb->bones && setting && out);
@@ -218,7 +195,26 @@ sonde_status sonde_limb_pose_create(const sonde_limb *limb, const sonde_limb_set
   pose->limb = limb, pose->setting = *setting;
   set_joints(pose);
   sonde_status status = pose->bed ? lay_bed(pose, error) : SONDE_OK;
-  if (!status) status = check_folds(pose, error);
+  // Least determinant of the map over the limb; where it is not well above 0 the tissue folds.
+  const double between = 0.015; // tissue that the bones of a joint squeeze is not asked
+  double least = INFINITY, at = 0;
+  for (double level = LIMB_TOP; level <= 2; level += 0.02)
+    for (int k = 0; k < 24; ++k)
+      for (int j = 1; j <= 3; ++j) {
+        double angle = 2 * SONDE_PI * k / 24;
+        double r = j / 3.0 * limb_skin_radius(limb, level, angle);
+        sonde_vec3 p = v_madd(limb_centre(limb, level), r, vec3(sin(angle), cos(angle), 0));
+        const double xyz[3] = {p.x, p.y, p.z};
+        if (limb_bone_distance(limb, xyz, NULL) < between) continue;
+        sonde_mat3 g = limb_pose_gradient(pose, p);
+        double det = v_dot(m_column(&g, 0), v_cross(m_column(&g, 1), m_column(&g, 2)));
+        if (det < least) least = det, at = level;
+      }
+  if (!status && !(least > 0.02))
+    status = sonde_fail(error, SONDE_ARGUMENT,
+                        "the tissue would fold at level %.2f in this position (volume changes by "
+                        "%.2f, expected above 0): bend hip or knee less",
+                        at, least);
   if (status) {
     sonde_free(pose);
     return status;

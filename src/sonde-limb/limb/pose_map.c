@@ -71,8 +71,10 @@ static sonde_vec3 bend_knee(const sonde_limb_pose *pose, sonde_vec3 p) {
   return v_add(pose->knee, v_madd(v, share * pose->roll, down));
 }
 
-// Turn of the hip about its centre; p and the point after the bend of the knee.
-static sonde_vec3 turn_hip(const sonde_limb_pose *pose, sonde_vec3 p, sonde_vec3 bent) {
+sonde_vec3 limb_pose_joints(const sonde_limb_pose *pose, sonde_vec3 p) {
+  sonde_vec3 bent = pose->knee_angle > 0 ? bend_knee(pose, p) : p;
+  if (!(pose->hip_angle > 0)) return bent;
+  // The hip turns about its centre, by a share that depends on the place at rest.
   const double from = 50 * SONDE_PI / 180, to = 145 * SONDE_PI / 180, far = 0.16;
   double tilt = 30 * SONDE_PI / 180;
   sonde_vec3 pole =
@@ -101,11 +103,6 @@ static sonde_vec3 turn_hip(const sonde_limb_pose *pose, sonde_vec3 p, sonde_vec3
   return turn_about(pose->hip_axis, share * pose->hip_angle, bent);
 }
 
-sonde_vec3 limb_pose_joints(const sonde_limb_pose *pose, sonde_vec3 rest) {
-  sonde_vec3 bent = pose->knee_angle > 0 ? bend_knee(pose, rest) : rest;
-  return pose->hip_angle > 0 ? turn_hip(pose, rest, bent) : bent;
-}
-
 // ---- the bed ------------------------------------------------------------------------------------
 
 typedef struct bed_place {
@@ -125,29 +122,6 @@ static bed_place bed_at(const sonde_limb_pose *pose, double along) {
                          (pose->lies[k] + u * (pose->lies[k + 1] - pose->lies[k]))};
 }
 
-// Layers are thinner the nearer they are to the bed and wider by as much.
-static sonde_vec3 squeeze(const sonde_limb_pose *pose, sonde_vec3 p) {
-  double t = v_dot(p, pose->along), s = v_dot(p, pose->across), h = v_dot(p, pose->up);
-  bed_place b = bed_at(pose, t);
-  double depth = h - b.low;
-  if (depth >= b.deep || b.lost <= 0 || b.deep <= 0) return p;
-  double held = fmax(depth, 0), layer = 1 - b.lost * (1 - held / b.deep);
-  double height = b.low + b.lost * b.deep / 2 + held - b.lost * (held - held * held / (2 * b.deep));
-  height += (depth - held) * layer;
-  return v_madd(v_madd(p, (s - b.middle) * (1 / layer - 1), pose->across), height - h, pose->up);
-}
-
-static sonde_vec3 release(const sonde_limb_pose *pose, sonde_vec3 q) {
-  double t = v_dot(q, pose->along), s = v_dot(q, pose->across), h = v_dot(q, pose->up);
-  bed_place b = bed_at(pose, t);
-  if (h - b.low >= b.deep || b.lost <= 0 || b.deep <= 0) return q;
-  // Height above the flattened skin: e = (1 - lost) d + lost d^2 / (2 deep).
-  double e = h - b.low - b.lost * b.deep / 2, first = 1 - b.lost, depth = e / first;
-  if (e > 0) depth = 2 * e / (first + sqrt(first * first + 2 * b.lost * e / b.deep));
-  double layer = 1 - b.lost * (1 - fmax(depth, 0) / b.deep);
-  return v_madd(v_madd(q, (s - b.middle) * (layer - 1), pose->across), b.low + depth - h, pose->up);
-}
-
 double limb_pose_bed_height(const sonde_limb_pose *pose, sonde_vec3 posed) {
   double t = v_dot(posed, pose->along);
   bed_place b = bed_at(pose, t);
@@ -159,8 +133,17 @@ double limb_pose_bed_height(const sonde_limb_pose *pose, sonde_vec3 posed) {
 }
 
 sonde_vec3 limb_pose_forward(const sonde_limb_pose *pose, sonde_vec3 rest) {
-  sonde_vec3 q = limb_pose_joints(pose, rest);
-  return pose->bed ? squeeze(pose, q) : q;
+  sonde_vec3 p = limb_pose_joints(pose, rest);
+  if (!pose->bed) return p;
+  // Layers are thinner the nearer they are to the bed and wider by as much.
+  double t = v_dot(p, pose->along), s = v_dot(p, pose->across), h = v_dot(p, pose->up);
+  bed_place b = bed_at(pose, t);
+  double depth = h - b.low;
+  if (depth >= b.deep || b.lost <= 0 || b.deep <= 0) return p;
+  double held = fmax(depth, 0), layer = 1 - b.lost * (1 - held / b.deep);
+  double height = b.low + b.lost * b.deep / 2 + held - b.lost * (held - held * held / (2 * b.deep));
+  height += (depth - held) * layer;
+  return v_madd(v_madd(p, (s - b.middle) * (1 / layer - 1), pose->across), height - h, pose->up);
 }
 
 sonde_mat3 limb_pose_gradient(const sonde_limb_pose *pose, sonde_vec3 rest) {
@@ -209,8 +192,17 @@ static double descend(const sonde_limb_pose *pose, sonde_vec3 q, sonde_vec3 off,
 double limb_pose_inverse(const sonde_limb_pose *pose, sonde_vec3 posed, sonde_vec3 *rest) {
   const double bound = LIMB_POSE_BOUND;
   static const sonde_limb_bone PARTS[3] = {SONDE_LIMB_FEMUR, SONDE_LIMB_TIBIA, SONDE_LIMB_PELVIS};
-  sonde_vec3 q = pose->bed ? release(pose, posed) : posed, guess[3], off[3];
+  sonde_vec3 q = posed, guess[3], off[3];
   double size[3], least = INFINITY;
+  // Undo the bed: e = (1 - lost) d + lost d^2 / (2 deep) is the height above the flattened skin.
+  double s = v_dot(q, pose->across), h = v_dot(q, pose->up);
+  bed_place b = bed_at(pose, v_dot(q, pose->along));
+  if (pose->bed && h - b.low < b.deep && b.lost > 0 && b.deep > 0) {
+    double e = h - b.low - b.lost * b.deep / 2, first = 1 - b.lost, depth = e / first;
+    if (e > 0) depth = 2 * e / (first + sqrt(first * first + 2 * b.lost * e / b.deep));
+    double layer = 1 - b.lost * (1 - fmax(depth, 0) / b.deep);
+    q = v_madd(v_madd(q, (s - b.middle) * (layer - 1), pose->across), b.low + depth - h, pose->up);
+  }
   // Begin as if the point belonged to thigh, calf or pelvis: the one that is right or nearest, then
   // the others.
   for (int k = 0; k < 3; ++k) {

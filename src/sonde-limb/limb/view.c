@@ -80,19 +80,6 @@ static void paint(const painter *p, const view_solid *solid, uint16_t number, sa
   }
 }
 
-// The colour of a fine pixel: what is opaque, see-through muscles before it, the skin as a veil.
-static void mix(const sample *opaque, const sample *glass, const sample *veil, float colour[3]) {
-  for (int k = 0; k < 3; ++k) colour[k] = opaque->solid ? opaque->shade[k] : 255;
-  if (glass->solid && (!opaque->solid || glass->depth > opaque->depth)) {
-    float edge = 1 - glass->facing, part = 0.3f + 0.4f * edge * edge;
-    for (int k = 0; k < 3; ++k) colour[k] += part * (glass->shade[k] - colour[k]);
-  }
-  if (veil->solid) {
-    float edge = 1 - veil->facing, part = 0.08f + 0.5f * edge * edge * edge;
-    for (int k = 0; k < 3; ++k) colour[k] += part * (veil->shade[k] - colour[k]);
-  }
-}
-
 // At most 96 colours of a picture: those that most pixels have, strong ones counting more, others
 // by the nearest. White is the last.
 static uint32_t choose_palette(const view_scene *scene, const uint8_t (*rgb)[3], uint32_t count,
@@ -223,9 +210,17 @@ static sonde_status put_panel(painter *p, const view_scene *scene, const struct 
     size_t y = i / (p->width / FINE), x = i % (p->width / FINE);
     for (uint32_t n = 0; n < FINE * FINE; ++n) {
       size_t at = (y * FINE + n / FINE) * p->width + x * FINE + n % FINE;
-      float colour[3];
-      mix(&p->opaque[at], &p->glass[at], &p->veil[at], colour);
-      for (int k = 0; k < 3; ++k) sum[k] += colour[k];
+      const sample *opaque = &p->opaque[at], *glass = &p->glass[at], *veil = &p->veil[at];
+      // See-through muscles only before what is opaque; both are denser at their edges.
+      bool before = glass->solid && (!opaque->solid || glass->depth > opaque->depth);
+      float edge = 1 - glass->facing, rim = 1 - veil->facing;
+      float muscle = before ? 0.3f + 0.4f * edge * edge : 0;
+      float skin = veil->solid ? 0.08f + 0.5f * rim * rim * rim : 0;
+      for (int k = 0; k < 3; ++k) {
+        float colour = opaque->solid ? opaque->shade[k] : 255;
+        colour += muscle * (glass->shade[k] - colour);
+        sum[k] += colour + skin * (veil->shade[k] - colour);
+      }
     }
     for (int k = 0; k < 3; ++k) rgb[i][k] = (uint8_t)(sum[k] / (FINE * FINE));
   }

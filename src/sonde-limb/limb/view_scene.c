@@ -110,36 +110,31 @@ static sonde_status add_lines(view_scene *scene, const sonde_limb *limb,
   sonde_vec3 point[MOST];
   double radius[MOST];
   sonde_status status = SONDE_OK;
-  for (uint32_t b = 0; b < v->branches + LIMB_NERVES && !status; ++b) {
-    view_kind kind = VIEW_NERVE;
-    uint32_t count = 0;
-    const char *name;
-    if (b < v->branches) {
-      const vessel_branch *branch = &v->branch[b];
-      bool outside =
-          branch->kind == SONDE_LIMB_SUPERFICIAL_VEIN || branch->kind == SONDE_LIMB_PERFORATOR;
-      kind = branch->kind == SONDE_LIMB_ARTERY ? VIEW_ARTERY
-             : outside                         ? VIEW_SUPERFICIAL
-                                               : VIEW_DEEP_VEIN;
-      name = branch->name;
-      for (uint32_t k = 0; k < branch->count && count < MOST; ++k) {
-        const vessel_place *place = limb_branch_places(v, b) + k;
-        point[count] = limb_side_point(limb, limb_branch_point(v, b, k));
-        double filled = place->radius + place->wall;
-        if (pose) filled = sonde_limb_pose_place(pose, b, place->arc).radius_m + place->wall;
-        radius[count++] = fmax(filled, thinnest);
-      }
-    } else {
-      const limb_nerve *nerve = &v->nerve[b - v->branches];
-      name = nerve->name;
-      for (uint32_t k = 0; k < nerve->count && count < MOST; ++k) {
-        point[count] = limb_side_point(limb, nerve->point[k]);
-        radius[count++] = nerve->radius + 0.6 * nerve->half;
-      }
+  for (uint32_t b = 0; b < v->branches && !status; ++b) {
+    const vessel_branch *branch = &v->branch[b];
+    uint32_t count = branch->count < MOST ? branch->count : MOST;
+    for (uint32_t k = 0; k < count; ++k) {
+      const vessel_place *place = limb_branch_places(v, b) + k;
+      point[k] = limb_side_point(limb, limb_branch_point(v, b, k));
+      double lumen = pose ? sonde_limb_pose_place(pose, b, place->arc).radius_m : place->radius;
+      radius[k] = fmax(lumen + place->wall, thinnest);
     }
-    if (count < 2) continue;
-    view_solid *solid = add_solid(scene, kind, name);
+    view_kind kind = VIEW_DEEP_VEIN;
+    if (branch->kind == SONDE_LIMB_ARTERY) kind = VIEW_ARTERY;
+    if (branch->kind == SONDE_LIMB_SUPERFICIAL_VEIN || branch->kind == SONDE_LIMB_PERFORATOR)
+      kind = VIEW_SUPERFICIAL;
+    view_solid *solid = add_solid(scene, kind, branch->name);
     status = make_tube(point, radius, count, &solid->mesh, error);
+    if (!status) status = finish(solid, pose, 0, error);
+  }
+  for (uint32_t n = 0; n < LIMB_NERVES && !status; ++n) {
+    const limb_nerve *nerve = &v->nerve[n];
+    if (nerve->count < 2) continue;
+    for (uint32_t k = 0; k < nerve->count; ++k)
+      point[k] = limb_side_point(limb, nerve->point[k]),
+      radius[k] = nerve->radius + 0.6 * nerve->half;
+    view_solid *solid = add_solid(scene, VIEW_NERVE, nerve->name);
+    status = make_tube(point, radius, nerve->count, &solid->mesh, error);
     if (!status) status = finish(solid, pose, 0, error);
   }
   return status;
@@ -151,27 +146,6 @@ typedef struct label_grid {
   uint8_t *cell; // muscle + 1, or TENDON
 } label_grid;
 enum { TENDON = 255 };
-
-static sonde_status fill_grid(label_grid *g, const sonde_limb *limb, sonde_error *error) {
-  const double half = 0.17;
-  double foot = limb_z(limb, 2), top = limb_z(limb, LIMB_TOP);
-  g->low = vec3(-half, -half, foot - 2 * GRID_STEP);
-  g->size[0] = g->size[1] = (uint32_t)(2 * half / GRID_STEP);
-  g->size[2] = (uint32_t)((top - foot) / GRID_STEP) + 5;
-  g->cell = SONDE_NEW(uint8_t, (size_t)g->size[0] * g->size[1] * g->size[2]);
-  if (!g->cell) return sonde_fail_memory(error);
-  uint8_t *cell = g->cell;
-  for (uint32_t z = 0; z < g->size[2]; ++z)
-    for (uint32_t y = 0; y < g->size[1]; ++y)
-      for (uint32_t x = 0; x < g->size[0]; ++x, ++cell) {
-        sonde_limb_label at =
-            sonde_limb_at(limb, vec3(g->low.x + x * GRID_STEP, g->low.y + y * GRID_STEP,
-                                     g->low.z + z * GRID_STEP));
-        if (at.tissue == SONDE_LIMB_MUSCLE) *cell = (uint8_t)(at.index + 1);
-        if (at.tissue == SONDE_LIMB_TENDON) *cell = TENDON;
-      }
-  return SONDE_OK;
-}
 
 // Surface of the cells of one value: of the mean of a cell and its neighbours, which rounds steps.
 static sonde_status add_cells(view_scene *scene, const label_grid *g, uint8_t value,
@@ -238,17 +212,31 @@ sonde_status view_scene_make(const sonde_limb *limb, const sonde_limb_pose *pose
     sonde_limb_label label = {SONDE_LIMB_BONE, k, limb->body.side};
     view_solid *bone = add_solid(scene, VIEW_BONE, sonde_limb_name(limb, label));
     status = sonde_limb_bone_mesh(limb, (sonde_limb_bone)k, 0.0035, &bone->mesh, error);
+    if (!status) status = smooth_mesh(&bone->mesh, 1, error);
     if (!status) status = finish(bone, pose, 1, error);
   }
   if (!status) status = add_lines(scene, limb, pose, error);
-  label_grid grid = {0};
-  if (!status) status = fill_grid(&grid, limb, error);
+  // Muscles and tendons: a grid of labels first.
+  const double half = 0.17;
+  double foot = limb_z(limb, 2), top = limb_z(limb, LIMB_TOP);
+  uint32_t side = (uint32_t)(2 * half / GRID_STEP), high = (uint32_t)((top - foot) / GRID_STEP) + 5;
+  label_grid g = {{side, side, high},
+                  vec3(-half, -half, foot - 2 * GRID_STEP),
+                  SONDE_NEW(uint8_t, (size_t)side * side * high)};
+  if (!g.cell && !status) status = sonde_fail_memory(error);
+  for (size_t n = 0; n < (size_t)side * side * high && !status; ++n) {
+    size_t x = n % side, y = n / side % side, z = n / side / side;
+    sonde_limb_label at =
+        sonde_limb_at(limb, v_madd(g.low, GRID_STEP, vec3((double)x, (double)y, (double)z)));
+    if (at.tissue == SONDE_LIMB_MUSCLE) g.cell[n] = (uint8_t)(at.index + 1);
+    if (at.tissue == SONDE_LIMB_TENDON) g.cell[n] = TENDON;
+  }
   for (uint32_t m = 0; m < SONDE_LIMB_MUSCLES && !status; ++m) {
     sonde_limb_label label = {SONDE_LIMB_MUSCLE, m, limb->body.side};
-    status = add_cells(scene, &grid, (uint8_t)(m + 1), sonde_limb_name(limb, label), pose, error);
+    status = add_cells(scene, &g, (uint8_t)(m + 1), sonde_limb_name(limb, label), pose, error);
   }
-  if (!status) status = add_cells(scene, &grid, TENDON, "tendons", pose, error);
-  sonde_free(grid.cell);
+  if (!status) status = add_cells(scene, &g, TENDON, "tendons", pose, error);
+  sonde_free(g.cell);
   if (status) view_scene_clear(scene);
   return status;
 }
