@@ -1,6 +1,6 @@
 // What a case adds: branches that close by themselves, clots in them, lesions that lie in the
 // tissue, refusals.
-#include "interior/interior.h"
+#include "interior/vessels.h"
 #include "interior/tube.h"
 
 #include <stdio.h>

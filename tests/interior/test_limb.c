@@ -2,7 +2,7 @@
 // tissue by a map, many vessels, also across the leg, blood that has weight.
 #include "interior/tube.h"
 
-#include "interior/interior.h"
+#include "interior/vessels.h"
 #include "sonde/tissue_anatomy.h"
 
 #include <stdlib.h>

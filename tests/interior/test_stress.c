@@ -1,7 +1,7 @@
 // Stress of the solid against the finite-element study of vessels, and vessels driven by it.
 #include "interior/study.h"
 #include "interior/window.h"
-#include "interior/interior.h"
+#include "interior/vessels.h"
 
 typedef struct stress_row {
   double penetration_m, force_n;

@@ -6,7 +6,7 @@
 // segment.
 #include "base/base.h"
 #include "echo/bands.h"
-#include "interior/interior.h"
+#include "interior/vessels.h"
 
 enum { PULSE_STEPS = 64 };
 

@@ -3,7 +3,7 @@
 #include "base/base.h"
 #include "echo/kernel.h"
 #include "interior/clot.h"
-#include "interior/interior.h"
+#include "interior/vessels.h"
 
 #include <math.h>
 

@@ -7,6 +7,7 @@
 #include "base/base.h"
 #include "base/random.h"
 #include "echo/cubes.h"
+#include "interior/vessels.h"
 
 static const double close_m = 10e-3; // rest distance within which a cube goes in pieces
 static const double close_radii = 3; // of a branch

@@ -4,6 +4,7 @@
 #include "base/base.h"
 #include "echo/echo.h"
 #include "interior/fields.h"
+#include "interior/vessels.h"
 #include "sonde/tissue_anatomy.h"
 
 enum { FIRST_ITERATIONS = 24, ITERATIONS = 8, NEWTON_ITERATIONS = 4 };

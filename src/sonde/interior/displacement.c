@@ -2,7 +2,7 @@
 // leave room, moved by the field, and the field's bends are smoothed at the walls
 // (docs/interior_theory.md). The inverse is exact in a lumen and iterated elsewhere.
 #include "base/base.h"
-#include "interior/interior.h"
+#include "interior/vessels.h"
 
 static const double least_share = 1e-9;
 static const double probing_m = 1e-6, longest_m = 4e-3; // of a step of Newton's

@@ -11,7 +11,7 @@
 // V + V'/2 = -grad Phi takes one solve.
 #include "base/base.h"
 #include "interior/clot.h"
-#include "interior/interior.h"
+#include "interior/vessels.h"
 #include "interior/fold_repair.h"
 #include "interior/window.h"
 

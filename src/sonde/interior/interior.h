@@ -8,6 +8,7 @@
 
 #include "base/link.h"
 #include "base/maths.h"
+#include "interior/law.h"
 #include "sonde/interior.h"
 #include "sparse/direct.h"
 #include "sonde/interior_findings.h"
@@ -163,48 +164,6 @@ bool sonde_interior_in_bone(const sonde_interior *interior, sonde_vec3 rest_m,
 bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
                            sonde_column_point *at);
 
-// Position of a rest point along a vessel's line; that of a vessel along the leg is s. @thread any
-static inline double sonde_vessel_along(const sonde_interior *in, uint32_t which, sonde_vec3 rest_m,
-                                        double s_m) {
-  const sonde_vessel_course *course = &in->course[which];
-  return course->tilted ? v_dot(v_sub(rest_m, in->origin), course->line) : s_m;
-}
-// Sections i and i + 1 of a vessel around a position along its line and the share between them,
-// 0..1; false beyond the vessel's ends. @thread any
-bool sonde_vessel_sections(const sonde_interior *interior, uint32_t which, double along_m,
-                           uint32_t *i, double *share);
-// State of a vessel interpolated at a position along its line. @thread any
-bool sonde_vessel_at(const sonde_interior *interior, uint32_t which, double along_m,
-                     sonde_vessel_state *state);
-// Branches whose walls may move a rest point at axial position s, a bit each. @thread any
-uint64_t sonde_vessels_reaching(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);
-// Where the wall warps a point given relative to the centre of the undisturbed cross-section,
-// at rest: the tissue's gradient takes a point of the lumen from there to the lumen as it is.
-// Keeps orientation, fades out with distance. @thread any
-void sonde_vessel_warp(const sonde_vessel_state *state, double *short_m, double *long_m);
-// Where the tissue's gradient carries it. @thread any
-void sonde_vessel_tissue(const sonde_vessel_state *state, double *short_m, double *long_m);
-// A point goes first to where the walls near it warp the tissue, at rest still, then with the
-// field, and last to where the walls smooth the field's bends: the position of a rest point that
-// was warped to `warped_m` and that the field took to `moved_m`. @thread any
-sonde_vec3 sonde_vessels_warp(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m);
-sonde_vec3 sonde_vessels_smooth(const sonde_vessel_state *near, uint32_t count, sonde_vec3 rest_m,
-                                sonde_vec3 warped_m, sonde_vec3 moved_m);
-// Vessels whose walls can move a rest point at axial position s; their number. @thread any
-uint32_t sonde_vessels_near(const sonde_interior *interior, sonde_vec3 rest_m, double s_m,
-                            sonde_vessel_state near[SONDE_VESSELS]);
-typedef struct sonde_wall_steps {
-  sonde_vec3 warped_m, moved_m, smoothed_m;
-} sonde_wall_steps;
-// The steps of a rest point beside these vessels: warp, field, smoothing. @thread any
-sonde_wall_steps sonde_vessels_trace(const sonde_interior *interior, const sonde_vessel_state *near,
-                                     uint32_t count, sonde_vec3 rest_m);
-// Displacement of a rest point at s, vessels included, also beyond the skin. @thread any
-sonde_vec3 sonde_vessels_displace(const sonde_interior *interior, sonde_vec3 rest_m, double s_m);
-// Whether the wall of a branch can move a point; cheaper than its state. @thread any
-bool sonde_vessel_reaches(const sonde_interior *interior, uint32_t which, double along_m,
-                          sonde_vec3 rest_m, double beyond_m);
-
 // Coordinates of a rest point in a lesion: unit ball. @thread any
 sonde_vec3 sonde_lesion_point(const sonde_interior *interior, uint32_t lesion, sonde_vec3 rest_m);
 // Label of the lesion at a rest point, LABEL_COUNT when there is none. @thread any
@@ -254,30 +213,6 @@ void sonde_sections_mark(sonde_interior *interior);
 // Layer depths of the table again as the model gives them; windows have to be made again.
 void sonde_columns_refresh(sonde_interior *interior);
 
-// Area ratio of a vein between muscles or in the fat.
-double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, bool in_fat);
-// Ellipse of a vein or artery with that area ratio: half axes over the rest radius.
-void sonde_vessel_shape(sonde_vessel_kind kind, const sonde_pathology *pathology, bool clot,
-                        double ratio, double *half_short, double *half_long);
-// Radius of the vein at rest relative to the healthy one at 10 mmHg.
-double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot, bool in_fat);
-// Radius of the artery at its pressure relative to that at 95 mmHg.
-double sonde_artery_rest_scale(const sonde_pathology *pathology);
-// Blood's pressure (Pa) at position s of a limb over that at the groin, by posture: in a vein the
-// valves carry a part. 0 in a thigh, which ends above the knee. @thread any
-double sonde_hydrostatic_pressure(const sonde_interior *interior, sonde_posture posture,
-                                  sonde_vessel_kind kind, double s_m);
-// True where a thrombus lies.
-bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m);
-
-// Area of the vein relative to its rest area at an effective outside pressure (Pa), for a lumen
-// pressure and thrombus (tube law, docs/interior_theory.md). Monotone, > 0. @thread any
-double sonde_vein_area_ratio(const sonde_pathology *pathology, double outside_pa);
-// Area of the artery relative to its rest area at an effective outside pressure (Pa). @thread any
-double sonde_artery_area_ratio(const sonde_pathology *pathology, double outside_pa);
-// Pressure inside an empty vein's wall (Pa) that holds it at `area_ratio` of its stress-free area
-// glued to muscle, for a wall of that shear modulus. Monotone. @thread any
-double sonde_vein_tube_pressure(double area_ratio, double wall_shear_pa);
 // Normal stresses (Pa, compression positive) below a uniformly loaded rectangle on an
 // incompressible half space: lateral x, axial y, normal z (docs/interior_theory.md, superposed
 // corners).
@@ -296,11 +231,5 @@ bool sonde_interior_stress(const sonde_interior *interior, sonde_vec3 rest_m, so
 // @thread any, not during an update
 const sonde_vessel_state *sonde_interior_vessel(const sonde_interior *interior, int which,
                                                 uint32_t *count);
-// Pressure in the common femoral vein (Pa) at time t: posture, breath, Valsalva
-// (docs/interior_theory.md). A function of t only. @thread any
-double sonde_venous_pressure(const sonde_circulation *circulation, double t_s);
-// Pressure in the femoral artery (Pa) at time t: between diastolic and systolic, periodic.
-// @thread any
-double sonde_arterial_pressure(const sonde_circulation *circulation, double t_s);
 
 #endif

@@ -1,7 +1,7 @@
 // Sections of the vessels: the model's centre lines in equal pieces, ascending along the femur's
 // axis.
 #include "base/base.h"
-#include "interior/interior.h"
+#include "interior/vessels.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 // Vessels under the probe: load on the skin -> stress at the vessel -> area -> ellipse -> tissue
 // around it (docs/interior_theory.md). Where a wall would fold the tissue it gives way.
 #include "base/base.h"
-#include "interior/interior.h"
+#include "interior/vessels.h"
 #include "interior/window.h"
 
 static const double engaged_pa = 200;       // from outside: a wall shapes the tissue beside it
