@@ -108,6 +108,19 @@ double limb_muscle_rule(const sonde_limb_body *b) {
   return (47 * b->stature_m * mass + 1285) / 7300 * (b->sex == SONDE_SEX_FEMALE ? 0.92 : 1) * old;
 }
 
+double limb_groin_fat(const sonde_limb_body *b) {
+  double lean = b->sex == SONDE_SEX_FEMALE ? 0.012 : 0.008;
+  return fmax(lean + 0.001 * (b->bmi - 22.5), 0.003);
+}
+
+double limb_groin_cover(const sonde_limb_body *b) {
+  // The front wall of the vein is 19 mm deep, that of the artery 15 mm, both 1.2 mm more per unit
+  // of body mass index (docs/limb_vessels.md). The artery stands 4 mm deeper than its own rule, so
+  // that the middles of both are at one depth within 4 mm.
+  double depth = 0.019 + 0.0012 * (b->bmi - 22.5);
+  return clamp(depth - limb_groin_fat(b) - b->skin_m, 0.0045, 0.014);
+}
+
 // Fat: the front of mid-thigh by sex and BMI and by what girth and muscle volume leave, the other
 // places by it.
 static void draw_fat(const draw *d) {
@@ -130,8 +143,7 @@ static void draw_fat(const draw *d) {
   fat(d, &b->fat_medial_m, 1.5 * f, 0.1);
   fat(d, &b->fat_lateral_m, 0.7 * f, 0.1);
   fat(d, &b->fat_back_m, 1.1 * f, 0.1);
-  double groin = (w ? 0.012 : 0.008) + 0.001 * (b->bmi - (w ? 25.5 : 27.7));
-  fat(d, &b->fat_groin_m, fmax(groin, 0.003), 0.35);
+  fat(d, &b->fat_groin_m, limb_groin_fat(b), 0.25);
   double calf = sqrt(fatter);
   fat(d, &b->fat_popliteal_m, (w ? 0.013 : 0.008) * calf, 0.25);
   fat(d, &b->fat_calf_m, (w ? 0.011 : 0.007) * calf, 0.3);

@@ -66,6 +66,12 @@ void limb_polar(const sonde_limb *limb, const double xyz[3], double *level, doub
 // mass, less for women and for age above 60.
 double limb_muscle_rule(const sonde_limb_body *body);
 
+// Mean thickness of the fat over the femoral vessels at the groin, m: by sex and body mass.
+double limb_groin_fat(const sonde_limb_body *body);
+// Mean depth of the front wall of the common femoral artery under the deep fascia, m: what its
+// depth under the skin leaves when skin and fat are taken away.
+double limb_groin_cover(const sonde_limb_body *body);
+
 // Fills surface of a limb whose body is drawn. @return ARGUMENT when fat leaves no room
 sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error);
 

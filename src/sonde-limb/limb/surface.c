@@ -110,7 +110,7 @@ static const double PROFILE[][3] = {
     {1.72, 246, 0}, {1.86, 217, 0}, {1.93, 222, 0}, {2, 238, 0}};
 // Level, second amplitude and direction (degrees), third amplitude and direction.
 static const double HARMONICS[][5] = {
-    {-0.2, 0.1, 160, 0, 0},        {0, 0.12, 165, 0.01, 30},       {0.12, 0.11, 130, 0.03, 33},
+    {-0.2, 0.1, 160, 0.03, 33},    {0, 0.12, 165, 0.045, 33},      {0.12, 0.11, 130, 0.036, 33},
     {0.25, 0.145, 110, 0.034, 35}, {0.35, 0.165, 116, 0.02, 35},   {0.5, 0.165, 125, 0.019, 35},
     {0.65, 0.125, 129, 0.012, 20}, {0.75, 0.09, 131, 0.015, 10},   {0.86, 0.04, 150, 0.025, 0},
     {0.93, 0.06, 175, 0.03, 0},    {1, 0.085, 179, 0.03, 0},       {1.06, 0.09, 180, 0.05, 0},
@@ -256,7 +256,7 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
   SONDE_ASSERT(limb->bones);
   const sonde_limb_body *b = &limb->body;
   limb_surface *s = &limb->surface;
-  double(*around)[LIMB_ANGLES] = sonde_calloc((size_t)3 * LIMB_ROWS, sizeof *around);
+  double(*around)[LIMB_ANGLES] = sonde_calloc((size_t)4 * LIMB_ROWS, sizeof *around);
   if (!around) return sonde_fail_memory(error);
   double outside[LIMB_ANGLES], none[LIMB_ANGLES] = {0};
   // Sections as if there were no bones.
@@ -287,44 +287,54 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
                       : at < 1 ? limb_shaft_axis(b, at)
                                : limb_tibia_axis(b, at);
     knots[k][0] = at, knots[k][1] = bone.x - f * sin(a), knots[k][2] = bone.y - f * cos(a);
-    if (at <= 0) knots[k][2] = 0.062 * limb->scale - limb_fascia_radius(limb, at, 0.25);
+    // The femoral artery's front wall stands 55 mm before the hip's centre, the fascia before it.
+    if (at <= 0)
+      knots[k][2] = 0.055 * limb->scale + limb_groin_cover(b) - limb_fascia_radius(limb, at, 0.25);
   }
   // The fascia passes outside the bones; the girth stays. What the bones add and what the size
   // loses by them are spread over neighbouring rows, so that the skin has no edge there.
   double(*bone)[LIMB_ANGLES] = &around[LIMB_ROWS], (*pushed)[LIMB_ANGLES] = &around[2 * LIMB_ROWS];
-  for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
-    double level = LIMB_TOP + r * LIMB_STEP;
-    s->x[r] = KNOTS(knots, 1, level), s->y[r] = KNOTS(knots, 2, level);
-    sonde_vec3 centre = vec3(s->x[r], s->y[r], limb_z(limb, level));
-    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-      double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
-      bone[r][c] =
-          bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], level < 0.15 ? 0.003 : 0.0012);
-      outside[c] = s->fat[r][c] + b->skin_m;
-    }
-    fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
-  }
-  for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
-    enum { SPREAD = 6 };
-    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-      double sum = 0, weights = 0;
-      for (int k = -SPREAD; k <= SPREAD; ++k) {
-        int row = (int)r + k;
-        if (row < 0 || row >= LIMB_ROWS) continue;
-        double w = SPREAD + 1 - abs(k);
-        sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
-      }
-      // Also what reaches the rows and, at pelvis and patella, the angles beside.
-      double reach = 0;
+  double(*fascia)[LIMB_ANGLES] = &around[3 * LIMB_ROWS];
+  for (uint32_t pass = 0; pass < 2; ++pass) {
+    for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
       double level = LIMB_TOP + r * LIMB_STEP;
-      int aside = level < 0.15 || fabs(level - 0.95) < 0.1 ? 1 : 0;
-      for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
-        for (int q = -aside; q <= aside; ++q)
-          reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
-      around[r][c] = fmax(s->fascia[r][c] + sum / weights, reach);
+      s->x[r] = KNOTS(knots, 1, level), s->y[r] = KNOTS(knots, 2, level);
+      sonde_vec3 centre = vec3(s->x[r], s->y[r], limb_z(limb, level));
+      for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+        double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
+        bone[r][c] =
+            bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], level < 0.15 ? 0.003 : 0.0012);
+        outside[c] = s->fat[r][c] + b->skin_m;
+      }
+      fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
+    }
+    for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
+      enum { SPREAD = 6 };
+      for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+        double sum = 0, weights = 0;
+        for (int k = -SPREAD; k <= SPREAD; ++k) {
+          int row = (int)r + k;
+          if (row < 0 || row >= LIMB_ROWS) continue;
+          double w = SPREAD + 1 - abs(k);
+          sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
+        }
+        // Also what reaches the rows and, at pelvis and patella, the angles beside.
+        double reach = 0;
+        double level = LIMB_TOP + r * LIMB_STEP;
+        int aside = level < 0.15 || fabs(level - 0.95) < 0.1 ? 1 : 0;
+        for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
+          for (int q = -aside; q <= aside; ++q)
+            reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
+        fascia[r][c] = fmax(s->fascia[r][c] + sum / weights, reach);
+      }
+    }
+    // At the groin the section moves by what the push has taken from its front.
+    for (size_t k = 0; k < SONDE_COUNT_OF(CENTRES) && pass == 0 && CENTRES[k][0] <= 0; ++k) {
+      uint32_t row = (uint32_t)lround((CENTRES[k][0] - LIMB_TOP) / LIMB_STEP);
+      knots[k][2] += s->fascia[row][3] - fascia[row][3];
     }
   }
-  memcpy(s->fascia, around, sizeof s->fascia);
+  memcpy(s->fascia, fascia, sizeof s->fascia);
   for (uint32_t r = 0; r < LIMB_ROWS; ++r) recentre(&s->x[r], &s->y[r], s->fascia[r]);
   sonde_free(around);
   return SONDE_OK;

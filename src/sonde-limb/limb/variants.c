@@ -145,20 +145,17 @@ vessel_draws limb_vessel_draws(const sonde_limb *limb) {
     d.wander[k] = limb_draw_normal(b->seed, DRAW_WANDER + k);
   d.ligament_z = 22 * mm;
   d.junction_z = (-11 + 3 * z[0]) * mm;
-  d.bifurcation_z = d.junction_z - (12 + 2.5 * z[1]) * mm;
-  d.confluence_z = d.bifurcation_z - clamp(20 + 4 * z[2], 15, 34) * mm;
+  d.bifurcation_z = d.junction_z - (10 + 2 * z[1]) * mm;
+  d.confluence_z = d.bifurcation_z - clamp(21 + 4 * z[2], 15, 34) * mm;
   d.hiatus = 0.72 + 0.025 * z[3];
   const sonde_limb_popliteal_artery kind = d.variants.popliteal_artery;
   d.trifurcation = kind == SONDE_LIMB_POPLITEAL_HIGH ? 0.97 + 0.01 * z[4] : 1.13 + 0.012 * z[4];
   d.trunk_end = kind == SONDE_LIMB_POPLITEAL_HIGH           ? 1.2 + 0.01 * z[5]
                 : kind == SONDE_LIMB_POPLITEAL_TRIFURCATION ? d.trifurcation + 0.004
                                                             : d.trifurcation + 0.085 + 0.012 * z[5];
-  // Depth by body mass; of its deviation of 4.5 mm the fat over it has a part.
-  bool female = b->sex == SONDE_SEX_FEMALE;
-  double fat = (female ? 0.012 : 0.008) + 0.001 * (b->bmi - (female ? 25.5 : 27.7));
-  double spread = 0.35 * fmax(fat, 0.003),
-         own = sqrt(fmax(0.0045 * 0.0045 - spread * spread, 1e-6));
-  d.artery_depth =
-      0.018 + 0.0012 * (b->bmi - 22.5) + (b->fat_groin_m - fmax(fat, 0.003)) + own * z[6];
+  // Depth by body mass; of its deviation of 4.5 mm the fat over it has the greater part.
+  double fat = limb_groin_fat(b), spread = 0.25 * fat;
+  double own = fmin(sqrt(fmax(0.0045 * 0.0045 - spread * spread, 1e-6)), 0.0015);
+  d.artery_cover = limb_groin_cover(b) + own * z[6];
   return d;
 }

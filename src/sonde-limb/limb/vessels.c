@@ -179,6 +179,13 @@ sonde_status limb_vessels_make(sonde_limb *limb, sonde_error *error) {
   if (status) return status;
   limb_vessels_lay_perforators(v);
   status = limb_vessels_relax(v, 100, error);
+  // What is crowded takes longer: on until every place keeps its distances.
+  for (uint32_t more = 0; more < 10 && !status; ++more) {
+    status = limb_vessels_count_faults(v, error);
+    const sonde_limb_vessel_faults *f = &v->faults;
+    if (status || f->walls + f->bone + f->fascia + f->eye == 0) break;
+    status = limb_vessels_relax(v, 40, error);
+  }
   // Arcs along the lines as they lie now.
   for (uint32_t b = 0; b < v->branches; ++b) {
     vessel_place *place = &v->place[v->branch[b].first];

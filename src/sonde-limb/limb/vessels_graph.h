@@ -67,7 +67,7 @@ typedef struct vessel_draws {
   double radius[DIA_COUNT];
   double ligament_z, junction_z, bifurcation_z, confluence_z; // of the groin
   double hiatus, trifurcation, trunk_end;                     // levels
-  double artery_depth; // of the front wall of the common femoral artery below the skin
+  double artery_cover; // depth of the common femoral artery's front wall below the fascia
   double wander[8];    // standard normal numbers of the lines' angles
 } vessel_draws;
 

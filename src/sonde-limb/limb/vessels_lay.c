@@ -51,30 +51,49 @@ static sonde_vec3 groin_point(const sonde_limb *limb, double x, double z, double
   return vec3(x, c.y + limb_fascia_radius(limb, level, angle) * cos(angle) - cover, z);
 }
 
+// The point of a level and an angle, outside of the femur, whose distance to bone is `away`.
+static sonde_vec3 off_femur(const sonde_limb *limb, double level, double degrees, double away) {
+  double low = 0, high = 0.9;
+  sonde_vec3 p = limb_at(limb, level, degrees, high);
+  for (int k = 0; k < 20; ++k) {
+    double f = 0.5 * (low + high);
+    p = limb_at(limb, level, degrees, f);
+    const double at[3] = {p.x, p.y, p.z};
+    if (limb_bone_distance(limb, at, NULL) < away)
+      low = f;
+    else
+      high = f;
+  }
+  return p;
+}
+
 // The knots of the artery from the pelvis to the end of the tibioperoneal trunk.
 static uint32_t main_artery(const struct limb_vessels *v, sonde_vec3 *knot) {
   const sonde_limb *limb = v->limb;
   const vessel_draws *d = &v->draws;
   const double mm = 1e-3 * limb->scale, r = d->radius[DIA_CFA] + ARTERY_WALL;
-  // Depth of the centre below the fascia; the fat varies from limb to limb.
-  double fat = limb_fat(limb, 0, 10 * DEGREE) + limb->body.skin_m;
-  double cover = clamp(d->artery_depth - fat, 0.0035, 0.014) + r;
+  // Depth of the centre below the fascia; a wide vein beside the artery needs as much.
+  double cover = fmax(fmax(d->artery_cover, 0.0025) + r, d->radius[DIA_CFV] + 0.0055);
   uint32_t n = 0;
   knot[n++] = groin_point(limb, 6 * mm, 86 * mm, cover + 26 * mm);
   knot[n++] = groin_point(limb, 10 * mm, 48 * mm, cover + 9 * mm);
   knot[n++] = groin_point(limb, 14 * mm, 22 * mm, cover);
   knot[n++] = groin_point(limb, 17 * mm, -8 * mm, cover);
   knot[n++] = groin_point(limb, 19 * mm, d->bifurcation_z, cover + 1 * mm);
-  const double femoral[][3] = {
-      {0.15, 21, 0.79}, {0.25, 36, 0.71},  {0.35, 48, 0.69},  {0.45, 60, 0.67},  {0.52, 70, 0.67},
-      {0.60, 87, 0.64}, {0.66, 104, 0.49}, {0.72, 135, 0.41}, {0.80, 165, 0.42}, {0.90, 180, 0.50},
-      {1.0, 186, 0.52}, {1.08, 182, 0.42}, {1.13, 172, 0.36}, {1.17, 155, 0.31}, {1.22, 135, 0.28}};
+  const double femoral[][3] = {{0.15, 21, 0.79},   {0.25, 36, 0.71},    {0.35, 48, 0.69},
+                               {0.45, 60, 0.67},   {0.52, 70, 0.67},    {0.58, 83, 0.031},
+                               {0.66, 104, 0.024}, {0.72, 135, 0.0145}, {0.80, 165, 0.42},
+                               {0.90, 180, 0.50},  {1.0, 186, 0.52},    {1.08, 182, 0.42},
+                               {1.13, 172, 0.36},  {1.17, 155, 0.31},   {1.22, 135, 0.28}};
   double shift = d->hiatus - 0.72, turn = 3 * d->wander[0];
   for (size_t k = 0; k < SONDE_COUNT_OF(femoral); ++k) {
     double level = femoral[k][0], near = fmax(0, 1 - fabs(level - 0.68) / 0.2);
     if (level > d->trunk_end - 0.012 && k > 12) continue;
-    knot[n++] = limb_at(limb, level + shift * near, femoral[k][1] + turn * (level < 1 ? 1 : 0.3),
-                        femoral[k][2]);
+    double degrees = femoral[k][1] + turn * (level < 1 ? 1 : 0.3);
+    level += shift * near;
+    // In the canal the third number is the distance from the femur, m; elsewhere a fraction.
+    knot[n++] = femoral[k][2] < 0.1 ? off_femur(limb, level, degrees, femoral[k][2])
+                                    : limb_at(limb, level, degrees, femoral[k][2]);
   }
   knot[n++] = limb_at(limb, fmax(d->trunk_end, 1.145), 134, 0.28);
   return n;
@@ -131,8 +150,8 @@ void limb_vessels_lay_arteries(struct limb_vessels *v) {
   sonde_vec3 start = line.point[first_below(&line, d->bifurcation_z)];
   double below = limb_level(limb, start.z);
   knot[0] = start;
-  knot[1] = v_add(start, vec3(-0.006, -0.008, -0.014));
-  knot[2] = v_add(start, vec3(-0.009, -0.0165, -0.032));
+  knot[1] = v_add(start, vec3(-0.007, -0.009, -0.012));
+  knot[2] = v_add(start, vec3(-0.010, -0.017, -0.030));
   const double deep[][3] = {
       {0.07, 20, 0.44}, {0.12, 38, 0.36}, {0.20, 60, 0.30}, {0.30, 85, 0.26}, {0.42, 110, 0.24}};
   for (uint32_t k = 0; k < SONDE_COUNT_OF(deep); ++k)
@@ -160,8 +179,8 @@ void limb_vessels_lay_arteries(struct limb_vessels *v) {
               n);
   knot[0] = limb_branch_point(v, trunk, v->branch[trunk].count - 1);
   double split = limb_level(limb, knot[0].z);
-  const double tibial[][3] = {{split + 0.05, 118, 0.26}, {1.35, 108, 0.28}, {1.5, 108, 0.32},
-                              {1.65, 112, 0.42},         {1.75, 120, 0.52}, {1.88, 126, 0.66},
+  const double tibial[][3] = {{split + 0.05, 114, 0.32}, {1.35, 102, 0.40}, {1.5, 100, 0.46},
+                              {1.65, 106, 0.52},         {1.75, 118, 0.58}, {1.88, 126, 0.68},
                               {1.99, 122, 0.72}};
   for (size_t k = 0; k < SONDE_COUNT_OF(tibial); ++k)
     knot[1 + k] = limb_at(limb, tibial[k][0], tibial[k][1], tibial[k][2]);
@@ -176,7 +195,7 @@ void limb_vessels_lay_arteries(struct limb_vessels *v) {
 // ---- veins beside arteries ----------------------------------------------------------------------
 
 // Direction of the vein from its artery by level, degrees (leg from groin to the calf's upper end).
-static const double VEIN_TURN[][2] = {{-0.2, 118}, {-0.05, 110}, {0.05, 122}, {0.15, 138},
+static const double VEIN_TURN[][2] = {{-0.2, 112}, {-0.05, 106}, {0.05, 116}, {0.15, 136},
                                       {0.25, 160}, {0.5, 180},   {0.65, 205}, {0.72, 230},
                                       {0.85, 210}, {1.0, 185},   {1.08, 160}, {1.2, 150}};
 

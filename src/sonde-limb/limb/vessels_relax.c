@@ -15,6 +15,9 @@ typedef struct neighbours {
   uint32_t *owner;           // branch of each place
   uint32_t begin[SLABS + 1]; // places by slab, in listed
   uint32_t *listed;
+  uint32_t pairs, room;
+  uint32_t (*pair)[2]; // a place and the first place of a piece that can come near it
+  double *clear;       // least way that each place has to go until bone is too near, m
 } neighbours;
 
 static uint32_t slab_of(const neighbours *n, double z) {
@@ -37,6 +40,34 @@ static void list_places(neighbours *n) {
   for (uint32_t i = 0; i < v->places; ++i) n->listed[count[slab_of(n, node_of(v, i).z)]++] = i;
 }
 
+// Lists the pairs of a place and a piece of another branch that come near each other while both
+// move by less than 3 mm. @return false without memory
+static bool list_pairs(neighbours *n) {
+  const struct limb_vessels *v = n->v;
+  list_places(n);
+  n->pairs = 0;
+  for (uint32_t i = 0; i < v->places; ++i) {
+    sonde_vec3 p = node_of(v, i);
+    uint32_t a = n->owner[i], slab = slab_of(n, p.z);
+    uint32_t first = n->begin[slab > 0 ? slab - 1 : 0],
+             last = n->begin[slab + 2 < SLABS ? slab + 2 : SLABS];
+    for (uint32_t k = first; k < last; ++k) {
+      uint32_t j = n->listed[k], b = n->owner[j];
+      if (a == b || j + 1 == v->branch[b].first + v->branch[b].count) continue;
+      double reach = v->place[i].radius + v->place[j].radius + 0.013;
+      if (v_norm2(v_sub(p, node_of(v, j))) > reach * reach) continue;
+      if (n->pairs == n->room) {
+        void *grown = sonde_realloc(n->pair, n->room * sizeof *n->pair,
+                                    (2 * n->room + 8192) * sizeof *n->pair);
+        if (!grown) return false;
+        n->pair = grown, n->room = 2 * n->room + 8192;
+      }
+      n->pair[n->pairs][0] = i, n->pair[n->pairs++][1] = j;
+    }
+  }
+  return true;
+}
+
 // Distance of place i's outer face to that of the piece from place j on; *away: unit, from the
 // piece.
 static double wall_gap(const struct limb_vessels *v, uint32_t i, uint32_t j, sonde_vec3 *away) {
@@ -55,26 +86,18 @@ typedef void (*pair_fn)(void *user, uint32_t i, uint32_t j, double gap, sonde_ve
 
 static void for_pairs(const neighbours *n, pair_fn each, void *user) {
   const struct limb_vessels *v = n->v;
-  for (uint32_t i = 0; i < v->places; ++i) {
-    sonde_vec3 p = node_of(v, i);
-    uint32_t a = n->owner[i], slab = slab_of(n, p.z);
-    uint32_t first = n->begin[slab > 0 ? slab - 1 : 0],
-             last = n->begin[slab + 2 < SLABS ? slab + 2 : SLABS];
-    for (uint32_t k = first; k < last; ++k) {
-      uint32_t j = n->listed[k], b = n->owner[j];
-      if (a == b || j + 1 == v->branch[b].first + v->branch[b].count) continue;
-      sonde_vec3 q = node_of(v, j), away;
-      double reach = v->place[i].radius + v->place[j].radius + 0.007;
-      if (v_norm2(v_sub(p, q)) > reach * reach) continue;
-      double gap = wall_gap(v, i, j, &away);
-      // Where two branches join, their walls meet.
-      bool joined = false;
-      double radii = v->place[i].radius + v->place[j].radius;
-      for (uint32_t m = 0; m < 2 && v->shared[a][b][m]; ++m)
-        joined |= v_distance(p, v->node[v->shared[a][b][m] - 1]) < 2.6 * radii + 0.004;
-      if (gap > 0.002 || joined) continue;
-      each(user, i, j, gap, away);
-    }
+  for (uint32_t k = 0; k < n->pairs; ++k) {
+    uint32_t i = n->pair[k][0], j = n->pair[k][1], a = n->owner[i], b = n->owner[j];
+    sonde_vec3 p = node_of(v, i), away;
+    double radii = v->place[i].radius + v->place[j].radius, reach = radii + 0.007;
+    if (v_norm2(v_sub(p, node_of(v, j))) > reach * reach) continue;
+    // Where two branches join, their walls meet.
+    bool joined = false;
+    for (uint32_t m = 0; m < 2 && v->shared[a][b][m]; ++m)
+      joined |= v_distance(p, v->node[v->shared[a][b][m] - 1]) < 2.6 * radii + 0.004;
+    if (joined) continue;
+    double gap = wall_gap(v, i, j, &away);
+    if (gap <= 0.002) each(user, i, j, gap, away);
   }
 }
 
@@ -151,7 +174,9 @@ static void push_out(const neighbours *n, sonde_vec3 *step) {
                       ? 0.0008
                       : BONE_M; // at the malleolus bone is under the fascia
     if (v->branch[b].layer == LAYER_OUTER) continue;
+    if (n->clear[i] > 0) continue;
     double lack = size + keep - limb_bone_distance(v->limb, at, NULL);
+    n->clear[i] = -0.8 * lack;
     if (lack <= 0) continue;
     sonde_vec3 grow = {0};
     const double h = 2e-4;
@@ -180,9 +205,12 @@ static void pull_mates(const neighbours *n, const pushes *s) {
     for (uint32_t k = 0; k < v->branch[b].count; ++k) {
       uint32_t i = v->branch[b].first + k;
       sonde_vec3 p = node_of(v, i), away;
+      // Along the artery the nearest place moves on by a few places from one place to the next.
       double least = INFINITY;
-      for (uint32_t j = v->branch[mate].first;
-           j + 1 < v->branch[mate].first + v->branch[mate].count; ++j) {
+      uint32_t low = v->branch[mate].first, high = low + v->branch[mate].count - 1;
+      if (k > 0)
+        low = near > low + 12 ? near - 12 : low, high = near + 12 < high ? near + 12 : high;
+      for (uint32_t j = low; j < high; ++j) {
         double d2 = v_norm2(v_sub(node_of(v, j), p));
         if (d2 < least) least = d2, near = j;
       }
@@ -194,14 +222,18 @@ static void pull_mates(const neighbours *n, const pushes *s) {
 }
 
 static bool begin(neighbours *n, struct limb_vessels *v) {
-  *n = (neighbours){
-      .v = v, .owner = SONDE_NEW(uint32_t, v->places), .listed = SONDE_NEW(uint32_t, v->places)};
-  return n->owner && n->listed;
+  *n = (neighbours){.v = v,
+                    .owner = SONDE_NEW(uint32_t, v->places),
+                    .listed = SONDE_NEW(uint32_t, v->places),
+                    .clear = SONDE_NEW(double, v->places)};
+  return n->owner && n->listed && n->clear;
 }
 
 static void end(neighbours *n) {
   sonde_free(n->owner);
   sonde_free(n->listed);
+  sonde_free(n->pair);
+  sonde_free(n->clear);
 }
 
 sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_error *error) {
@@ -209,7 +241,7 @@ sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_e
   sonde_vec3 *step = SONDE_NEW(sonde_vec3, 2 * v->places);
   bool made = begin(&n, v) && step;
   for (uint32_t pass = 0; made && pass < passes; ++pass) {
-    list_places(&n);
+    if (pass % 8 == 0 && !list_pairs(&n)) made = false;
     pushes s = {&n, step};
     for (uint32_t i = 0; i < v->places; ++i) step[i] = vec3(0, 0, 0);
     for_pairs(&n, push_pair, &s);
@@ -237,6 +269,7 @@ sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_e
     for (uint32_t i = 0; i < v->places; ++i) {
       sonde_vec3 *node = &v->node[v->place[i].node];
       double length = v_norm(step[i]);
+      n.clear[i] -= fmin(length, 0.002);
       *node = v_madd(*node, length > 0.002 ? 0.002 / length : 1, step[i]);
     }
   }
@@ -253,8 +286,9 @@ static void count_pair(void *user, uint32_t i, uint32_t j, double gap, sonde_vec
 
 sonde_status limb_vessels_count_faults(struct limb_vessels *v, sonde_error *error) {
   neighbours n;
-  bool *touching = SONDE_NEW(bool, v->places), made = begin(&n, v) && touching;
-  if (made) list_places(&n), for_pairs(&n, count_pair, touching);
+  bool *touching = SONDE_NEW(bool, v->places), made = begin(&n, v) && touching && list_pairs(&n);
+  v->faults = (sonde_limb_vessel_faults){0};
+  if (made) for_pairs(&n, count_pair, touching);
   for (uint32_t i = 0; made && i < v->places; ++i) {
     uint32_t b = n.owner[i], k = i - v->branch[b].first;
     sonde_vec3 p = node_of(v, i);
