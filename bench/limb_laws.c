@@ -250,7 +250,7 @@ static const struct {
                        {"deep femoral confluence", confluence, 0, 26, 0, {{18, 26}, {28, 42}}},
                        {"femoral vein, middle", middle, -8, 8, 0, {{25, 38}, {40, 60}}},
                        {"adductor canal", canal, -8, 8, 0, {{30, 45}, {45, 70}}},
-                       {"popliteal vein", popliteal, -8, 16, 0, {{15, 25}, {23, 40}}},
+                       {"popliteal vein", popliteal, -8, 24, 0, {{15, 25}, {23, 40}}},
                        {"small saphenous vein", small_saphenous, -8, 8, 0, {{5, 12}, {8, 20}}},
                        {"trifurcation", trifurcation, -8, 8, 0, {{20, 35}, {28, 50}}},
                        {"posterior tibial veins", calf, -8, 8, -10, {{20, 35}, {20, 43}}},

@@ -30,18 +30,14 @@ static void places_keep_their_distances(void **state) {
     sonde_limb_vessel_faults f = sonde_limb_vessel_check(family[k]);
     sum.walls += f.walls, sum.bone += f.bone, sum.lumen += f.lumen;
     sum.fascia += f.fascia, sum.eye += f.eye;
-    if (f.bone + f.fascia > 3 || f.walls > 12)
+    if (f.walls + f.bone + f.fascia + f.eye > 0)
       print_message("member %u: walls %u, bone %u, lumen %u, fascia %u, eye %u\n", k, f.walls,
                     f.bone, f.lumen, f.fascia, f.eye);
     places += family[k]->vessels->places;
   }
   print_message("of %u places: walls %u, bone %u, lumen in bone %u, fascia %u, eye %u\n", places,
                 sum.walls, sum.bone, sum.lumen, sum.fascia, sum.eye);
-  assert_true(sum.lumen <= places / 15000);
-  assert_true(sum.bone <= places / 5000);
-  assert_true(sum.walls <= places / 5000);
-  assert_true(sum.fascia <= places / 5000);
-  assert_true(sum.eye <= places / 2000);
+  assert_int_equal(sum.walls + sum.bone + sum.lumen + sum.fascia + sum.eye, 0);
 }
 
 static void veins_reach_the_iliac_vein_and_arteries_the_iliac_artery(void **state) {

@@ -115,9 +115,9 @@ double limb_groin_fat(const sonde_limb_body *b) {
 
 double limb_groin_cover(const sonde_limb_body *b) {
   // The front wall of the vein is 19 mm deep, that of the artery 15 mm, both 1.2 mm more per unit
-  // of body mass index (docs/limb_vessels.md). The artery stands 4 mm deeper than its own rule, so
+  // of body mass index (docs/limb_vessels.md). The artery stands 5 mm deeper than its own rule, so
   // that the middles of both are at one depth within 4 mm.
-  double depth = 0.019 + 0.0012 * (b->bmi - 22.5);
+  double depth = 0.0198 + 0.0012 * (b->bmi - 22.5);
   return clamp(depth - limb_groin_fat(b) - b->skin_m, 0.0045, 0.014);
 }
 

@@ -4,6 +4,7 @@
 
 static const double ARTERY_WALL = 0.001, VEIN_WALL = 0.00045, SMALL_WALL = 0.0004;
 static const double WALL_GAP = 0.0008; // between the walls of an artery and its vein
+static const double BONE_GAP = 0.0021;
 
 // Value at x of the line through rows of x and value; constant beyond the ends.
 static double along(const double (*rows)[2], size_t count, double x) {
@@ -293,10 +294,30 @@ void limb_vessels_lay_deep_femoral(struct limb_vessels *v) {
   add_through(v, spec, knot, 3);
 }
 
+// Greatest radius of the popliteal vein: between the knee's bones and the fascia stand also the
+// artery, the tibial nerve and what keeps them apart. A straight knee narrows the vein of a lean
+// leg.
+static double popliteal_room(const struct limb_vessels *v) {
+  const double others = BONE_GAP + 2 * (v->draws.radius[DIA_POPA] + ARTERY_WALL) + WALL_GAP +
+                        2 * VEIN_WALL + 0.0068; // 4.5 mm of nerve, 2.3 mm around it
+  double least = INFINITY;
+  for (double level = 0.9; level < 1.06; level += 0.02) {
+    double depth = 0.004, radius = limb_fascia_radius(v->limb, level, SONDE_PI);
+    for (; depth < radius; depth += 0.0005) {
+      sonde_vec3 p = limb_below_fascia(v->limb, level, 183, depth);
+      const double at[3] = {p.x, p.y, p.z};
+      if (limb_bone_distance(v->limb, at, NULL) < 0) break;
+    }
+    least = fmin(least, depth);
+  }
+  return fmax(0.5 * (least - others), 0.0018);
+}
+
 void limb_vessels_lay_veins(struct limb_vessels *v) {
   const sonde_limb *limb = v->limb;
   const vessel_draws *d = &v->draws;
-  const double *r = d->radius;
+  double *r = v->draws.radius, room = popliteal_room(v);
+  r[DIA_POPV] = fmin(r[DIA_POPV], room), r[DIA_TPV] = fmin(r[DIA_TPV], 0.95 * r[DIA_POPV]);
   double hiatus = limb_z(limb, d->hiatus), split = limb_z(limb, fmin(1.13, d->trunk_end - 0.004));
   const radius_step step[] = {{1, r[DIA_EIV]},
                               {d->ligament_z, r[DIA_CFV]},

@@ -145,10 +145,14 @@ static bool crosses(const struct limb_vessels *v, uint32_t b, uint32_t k) {
   if (branch->layer == LAYER_ANY) return true;
   if (branch->layer == LAYER_DEEP) return false;
   const vessel_branch *parent = branch->parent == VESSEL_NONE ? NULL : &v->branch[branch->parent];
-  uint32_t free =
-      parent && parent->layer != branch->layer ? (parent->layer == LAYER_DEEP ? 14 : 8) : 0;
-  uint32_t end =
-      branch->joins != VESSEL_NONE && v->branch[branch->joins].layer != branch->layer ? 8 : 0;
+  // A vein that joins a wider one of its own layer ends in the middle of that, not in its own.
+  uint32_t free = !parent                          ? 0
+                  : parent->layer == branch->layer ? 2
+                  : parent->layer == LAYER_DEEP    ? 14
+                                                   : 8;
+  uint32_t end = branch->joins == VESSEL_NONE                      ? 0
+                 : v->branch[branch->joins].layer == branch->layer ? 2
+                                                                   : 8;
   return k < free || k + end >= branch->count;
 }
 
@@ -263,8 +267,12 @@ sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_e
         sonde_vec3 middle = v_lerp(node_of(v, first + k - 1), node_of(v, first + k + 1), 0.5);
         step[first + k] = v_madd(step[first + k], 0.03, v_sub(middle, node_of(v, first + k)));
       }
-      // Tributaries in the outer fat do not draw the vein in the eye outwards.
-      if (v->branch[b].layer == LAYER_OUTER) step[first] = step[first + count - 1] = vec3(0, 0, 0);
+      // Tributaries do not draw the superficial vein that they join out of its place.
+      const vessel_branch *branch = &v->branch[b];
+      bool inner = branch->layer == LAYER_EYE && v->branch[branch->parent].layer == LAYER_EYE;
+      if (branch->layer == LAYER_OUTER || inner) step[first] = vec3(0, 0, 0);
+      if (branch->layer == LAYER_OUTER || (inner && branch->joins != VESSEL_NONE))
+        step[first + count - 1] = vec3(0, 0, 0);
     }
     for (uint32_t i = 0; i < v->places; ++i) {
       sonde_vec3 *node = &v->node[v->place[i].node];

@@ -52,15 +52,18 @@ static double saphenous_angle(double level, double aside) {
 
 // A second trunk from `from` to `to` beside the great saphenous vein.
 static void lay_second_trunk(struct limb_vessels *v, const char *name, uint32_t main, double from,
-                             double to, double aside, double apart, vessel_layer layer) {
+                             double to, double apart, vessel_layer layer) {
   sonde_vec3 knot[48];
   double radius = 0.8 * v->draws.radius[DIA_GSV];
   uint32_t n = 0, a = limb_branch_at_level(v, main, from), e = limb_branch_at_level(v, main, to);
   knot[n++] = limb_branch_point(v, main, a);
   for (double level = from + 0.04; level < to - 0.03 && n + 1 < SONDE_COUNT_OF(knot);
        level += 0.03) {
-    double degrees =
-        saphenous_angle(level, aside) + apart * fmin(1, fmin((level - from), (to - level)) / 0.08);
+    // Beside the trunk as it lies there.
+    double degrees, at, f, ramp = fmin(1, fmin((level - from), (to - level)) / 0.08);
+    limb_place_of(v->limb, limb_branch_point(v, main, limb_branch_at_level(v, main, level)), &at,
+                  &degrees, &f);
+    degrees += apart * ramp;
     knot[n++] = layer == LAYER_EYE ? in_eye(v->limb, level, degrees, radius)
                                    : in_outer_fat(v->limb, level, degrees);
   }
@@ -113,11 +116,10 @@ uint32_t limb_vessels_lay_great(struct limb_vessels *v) {
       v->branch[great].valve[v->branch[great].valves++] = arc;
   }
   if (d->variants.great_saphenous == SONDE_LIMB_GSV_DOUBLE)
-    lay_second_trunk(v, "second great saphenous vein", great, 0.2, 0.93, aside, -14, LAYER_EYE);
+    lay_second_trunk(v, "second great saphenous vein", great, 0.2, 0.93, -14, LAYER_EYE);
   if (d->variants.great_saphenous == SONDE_LIMB_GSV_LOOP)
-    lay_second_trunk(v, "great saphenous loop", great, 0.28, 0.6, aside, -11, LAYER_EYE);
-  if (partial)
-    lay_second_trunk(v, "great saphenous tributary", great, 0.22, 0.78, aside, -8, LAYER_OUTER);
+    lay_second_trunk(v, "great saphenous loop", great, 0.28, 0.6, -11, LAYER_EYE);
+  if (partial) lay_second_trunk(v, "great saphenous tributary", great, 0.22, 0.78, -8, LAYER_OUTER);
   return great;
 }
 
@@ -313,6 +315,15 @@ void limb_vessels_lay_perforators(struct limb_vessels *v) {
     sonde_vec3 knot[3] = {
         limb_branch_point(v, inner, limb_branch_at_level(v, inner, level - 0.035)), vec3(0, 0, 0),
         limb_branch_point(v, outer, limb_branch_at_level(v, outer, level))};
+    // Of a pair it joins the vein that is nearer, so that it does not pass the other and the
+    // artery.
+    char other[SONDE_LIMB_VESSEL_NAME];
+    snprintf(other, sizeof other, "second %s", row[k].inner);
+    uint32_t second = limb_branch_find(v, other);
+    if (second != VESSEL_NONE && v->branch[second].mate != VESSEL_NONE) {
+      sonde_vec3 p = limb_branch_point(v, second, limb_branch_at_level(v, second, level - 0.035));
+      if (v_distance(p, knot[2]) < v_distance(knot[0], knot[2])) knot[0] = p, inner = second;
+    }
     knot[1] = v_lerp(knot[0], knot[2], 0.5);
     double z = limb_draw_normal(limb->body.seed, 128 + k);
     double radius = 0.5e-3 * clamp(1.3 + 0.56 * z, 0.4, 3.5);
