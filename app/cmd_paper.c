@@ -31,6 +31,7 @@ static const struct {
              {"fitting the thigh", paper_fit, 25},
              {"comparing models", paper_models, 70},
              {"filling the thigh", paper_bulk, 300},
+             {"refining the thigh", paper_equal, 60},
              {"drawing probes and springs", paper_drawings, 1},
              {"pressing the thigh", paper_pressed, 40},
              {"sweeping the thigh", paper_sweep, 15},
@@ -189,7 +190,7 @@ const app_command cmd_paper = {
     .text = "Regenerates figures 1 to 8 of \"Towards a realistic echographic simulator with force "
             "feedback\" (IROS 1999) from the bundled data, which are synthetic, and tries its "
             "claims one by one: the sentence, what was done, the figure, and whether it holds. "
-            "DIR gets paper.json, paper.html and fig1.svg to fig8.svg. Takes some minutes.",
+            "DIR gets paper.json, paper.html and fig1.svg to fig9.svg. Takes some minutes.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .required = "o",

@@ -17,10 +17,10 @@ typedef enum paper_verdict {
 enum {
   PAPER_CLAIMS = 32,
   PAPER_VALUES = 16,
-  PAPER_TABLES = 8,
+  PAPER_TABLES = 10,
   PAPER_ROWS = 16,
   PAPER_COLUMNS = 16,
-  PAPER_FIGURES = 8,
+  PAPER_FIGURES = 9,
   PAPER_TEXT = 640
 };
 
@@ -68,7 +68,11 @@ typedef struct paper {
   sonde_measurements third;        // of a third footprint, never fitted
   sonde_fit_def fit_def;           // of the three stages
   sonde_fit_result fit;            // zero until it is done
-  const sonde_site *central;       // where the examples are shown
+  struct {
+    bool known;
+    sonde_bulk_law law;
+  } fitted[SONDE_CONDENSED_SOLID + 1]; // volumetric models by sonde_model_kind
+  const sonde_site *central;           // where the examples are shown
   uint32_t claim_count, table_count;
   paper_claim claim[PAPER_CLAIMS];
   paper_table table[PAPER_TABLES];
@@ -114,6 +118,7 @@ sonde_status paper_curves(paper *p, sonde_error *error); // figures 4 and 5
 sonde_status paper_fit(paper *p, sonde_error *error);    // figure 7
 sonde_status paper_models(paper *p, sonde_error *error); // the table `models`
 sonde_status paper_bulk(paper *p, sonde_error *error);   // the table `volumetric`
+sonde_status paper_equal(paper *p, sonde_error *error);  // the table `equal_error`, figure 9
 // Processor time of a state's creation and of a step of 1 ms while the flat probe goes in, ms.
 sonde_status paper_time_steps(const paper *p, const sonde_model *model, double *setup_ms,
                               double *step_ms, sonde_error *error);

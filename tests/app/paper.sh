@@ -48,11 +48,17 @@ done
 list+=" tables.models.rows.two_layer_shear.third_percent<=2.6 tables.models.rows.linear_springs.both_percent>=20"
 for table in contact volume stability integration solvers distance; do list+=" tables.$table.title:text tables.$table.rows:object"; done
 for k in 1 2 3 4 5 6 7 8; do list+=" figures.fig$k.title:text figures.fig$k.caption:text figures.fig$k.bytes>=10000"; done
+list+=" figures.fig9.title:text figures.fig9.bytes>=2000 tables.equal_error.caption:text"
+list+=" $(checks_of elements_slower_at_equal_error 'two_layer_step_ms:number linear_solid_step_ms:number condensed_step_ms:number')"
+for row in two_layer_shear linear condensed; do
+  list+=" tables.equal_error.rows.$row.middle_percent<=8 tables.equal_error.rows.$row.equal_nodes:number"
+done
+list+=" tables.volumetric.rows.condensed.nodes<=2500 tables.volumetric.rows.condensed.step_ms:number"
 gives "$list" paper "$MODEL" -o paper --quick --json
 
 [[ ! -s $err ]] || wrong "sonde paper says something in a pipe"
 "$CHECK_JSON" kind=paper holds:integer <paper/paper.json || wrong "paper.json is not the object that was printed"
-for k in 1 2 3 4 5 6 7 8; do
+for k in 1 2 3 4 5 6 7 8 9; do
   [[ $(tail -c 7 "paper/fig$k.svg" 2>/dev/null) == "</svg>"* ]] || wrong "fig$k.svg is not whole"
   shapes=$(grep -cE '<(path|circle|image)' "paper/fig$k.svg" || true)
   ((shapes >= 1 + (k > 2) * 20)) || wrong "fig$k.svg holds $shapes shapes"

@@ -18,33 +18,6 @@ void sonde_condensed_destroy(sonde_condensed *c) {
 
 // ---- condensation -------------------------------------------------------------------------
 
-static sonde_status condense(const sonde_elastic *e, sonde_condensed *c, double start,
-                             sonde_condensed_times *times, sonde_error *error) {
-  const sonde_symbolic_def def = {.node_count = e->count,
-                                  .last_count = e->last_count,
-                                  .block = 3,
-                                  .points = e->point,
-                                  .row_start = e->row_start,
-                                  .column = e->column};
-  sonde_symbolic *symbolic = NULL;
-  sonde_numeric numeric = {0};
-  sonde_status status = sonde_symbolic_create(&def, &symbolic, error);
-  if (!status) status = sonde_numeric_reserve(&numeric, symbolic, error);
-  times->analysis_s = sonde_clock_now() - start;
-  const sonde_matrix_source source = {.value = e->value};
-  if (!status && !sonde_numeric_factor(&numeric, symbolic, &source))
-    status = sonde_fail(error, SONDE_CONVERGENCE, "the stiffness is not positive definite");
-  const size_t side = 3 * (size_t)c->count;
-  const double *lower = status ? NULL : sonde_numeric_condensed(&numeric);
-  for (size_t j = 0; j < side && !status; ++j)
-    for (size_t i = j; i < side; ++i)
-      c->stiffness[i * side + j] = c->stiffness[j * side + i] = lower[j * side + i];
-  times->factor_s = sonde_clock_now() - start - times->analysis_s;
-  sonde_numeric_clear(&numeric);
-  sonde_symbolic_destroy(symbolic);
-  return status;
-}
-
 sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
                                     sonde_condensed **condensed, sonde_condensed_times *times,
                                     sonde_error *error) {
@@ -61,6 +34,14 @@ sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
   if (!times) times = &ignored;
   double start = sonde_clock_now();
   const size_t side = 3 * (size_t)e->last_count;
+  const sonde_symbolic_def def = {.node_count = e->count,
+                                  .last_count = e->last_count,
+                                  .block = 3,
+                                  .points = e->point,
+                                  .row_start = e->row_start,
+                                  .column = e->column};
+  sonde_symbolic *symbolic = NULL;
+  sonde_numeric numeric = {0};
   sonde_condensed *c = *condensed = SONDE_NEW(sonde_condensed, 1);
   if (!c) return sonde_fail_memory(error);
   *c = (sonde_condensed){e->last_count, SONDE_NEW(uint32_t, e->last_count),
@@ -69,8 +50,20 @@ sonde_status sonde_condensed_create(const sonde_elastic *e, uint32_t workers,
       c->node && c->stiffness && c->compliance ? SONDE_OK : sonde_fail_memory(error);
   if (!status) {
     memcpy(c->node, nodes, e->last_count * sizeof *nodes);
-    status = condense(e, c, start, times, error);
+    status = sonde_symbolic_create(&def, &symbolic, error);
   }
+  if (!status) status = sonde_numeric_reserve(&numeric, symbolic, error);
+  times->analysis_s = sonde_clock_now() - start;
+  const sonde_matrix_source source = {.value = e->value};
+  if (!status && !sonde_numeric_factor(&numeric, symbolic, &source))
+    status = sonde_fail(error, SONDE_CONVERGENCE, "the stiffness is not positive definite");
+  const double *lower = status ? NULL : sonde_numeric_condensed(&numeric);
+  for (size_t j = 0; j < side && !status; ++j)
+    for (size_t i = j; i < side; ++i)
+      c->stiffness[i * side + j] = c->stiffness[j * side + i] = lower[j * side + i];
+  times->factor_s = sonde_clock_now() - start - times->analysis_s;
+  sonde_numeric_clear(&numeric);
+  sonde_symbolic_destroy(symbolic);
   if (!status) status = sonde_invert(c->stiffness, 3 * c->count, workers, c->compliance, error);
   times->inverse_s = sonde_clock_now() - start - times->analysis_s - times->factor_s;
   if (status) {

@@ -11,28 +11,6 @@
 
 #include <string.h>
 
-// The stiffness between the touched rows while all others follow, found anew for other rows.
-static bool find_stiffness(sonde_response *r, const sonde_state *state, const sonde_batches *body) {
-  uint32_t count = state->touched_count, n = 3 * count;
-  if (!r->changed) return true;
-  SONDE_ASSERT(count > 0 && count <= r->most);
-  memcpy(r->row, state->touched, count * sizeof *r->row);
-  for (uint32_t i = 0; i < n; ++i) {
-    const reals *column = body->tissue->compliance +
-                          3 * (3 * (size_t)r->row[i / 3] + i % 3) * body->common.batch_count;
-    for (uint32_t j = 0; j < n; ++j) {
-      uint32_t row = r->row[j / 3];
-      r->matrix[(size_t)i * n + j] =
-          (double)column[3 * (row / SONDE_BATCH) + j % 3][row % SONDE_BATCH];
-    }
-  }
-  r->count = 0;
-  if (!sonde_cholesky(r->matrix, n)) return false;
-  sonde_cholesky_invert(r->matrix, n, r->stiffness);
-  r->count = count;
-  return true;
-}
-
 // Adds the contact's part of the matrix: products with unit vectors, since corners are coupled.
 static void add_contact(sonde_response *r, sonde_batches *body) {
   const size_t quads = (size_t)SONDE_BATCH * SONDE_QUAD;
@@ -68,7 +46,23 @@ static bool push_touched(sonde_response *r, const sonde_state *state, sonde_batc
   const sonde_tissue *tissue = body->tissue;
   const double force_scale = (double)body->step.force_scale, gain = (double)tissue->gain;
   uint32_t n = 3 * state->touched_count;
-  if (!find_stiffness(r, state, body)) return false;
+  SONDE_ASSERT(n > 0 && n <= 3 * r->most);
+  // The stiffness between the touched rows while all others follow, found anew for other rows.
+  if (r->changed) {
+    memcpy(r->row, state->touched, state->touched_count * sizeof *r->row);
+    for (uint32_t i = 0; i < n; ++i) {
+      const reals *column =
+          tissue->compliance + 3 * (3 * (size_t)r->row[i / 3] + i % 3) * body->common.batch_count;
+      for (uint32_t j = 0; j < n; ++j) {
+        uint32_t s = r->row[j / 3] / SONDE_BATCH, l = r->row[j / 3] % SONDE_BATCH;
+        r->matrix[(size_t)i * n + j] = (double)column[3 * s + j % 3][l];
+      }
+    }
+    r->count = 0;
+    if (!sonde_cholesky(r->matrix, n)) return false;
+    sonde_cholesky_invert(r->matrix, n, r->stiffness);
+    r->count = state->touched_count;
+  }
   for (size_t k = 0; k < (size_t)n * n; ++k) r->matrix[k] = scale * r->stiffness[k];
   add_contact(r, body);
   for (uint32_t j = 0; j < n; ++j) {
