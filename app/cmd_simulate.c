@@ -217,7 +217,7 @@ typedef struct fault {
   const char *what, *other; // between the bodies' names and behind the second
 } fault;
 static const fault FAULTS[] = {
-    {SONDE_SCENE_INVERTED, "turned inside out", ""},
+    {SONDE_SCENE_INVERTED, "turned inside out or went through itself", ""},
     {SONDE_SCENE_PASSED, "went through", ""},
     {SONDE_SCENE_INSIDE, "was wholly inside", " and was let out"},
     {SONDE_SCENE_NON_FINITE, "a step was not finite and was undone", ""},

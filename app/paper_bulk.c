@@ -70,6 +70,13 @@ static double percent_at(const sonde_measurements *m, const double *model_n, con
              : paper_percent(&report, probe);
 }
 
+// The same with no force where a model has no equilibrium: what it cannot do counts against it.
+static double percent_of_all(const sonde_measurements *m, double *model_n) {
+  for (uint32_t i = 0; i < m->count; ++i)
+    if (!isfinite(model_n[i])) model_n[i] = 0;
+  return percent_at(m, model_n, NULL);
+}
+
 // Processor time of a state's creation and of a step of 1 ms while the flat probe goes in, ms.
 sonde_status paper_time_steps(const paper *p, const sonde_model *model, double *setup_ms,
                               double *step_ms, sonde_error *error) {
@@ -130,8 +137,11 @@ static sonde_status measure_kind(const paper *p, sonde_model_kind kind, const ch
   if (!status) status = paper_time_steps(p, *model, &setup_ms, &step_ms, error);
   if (!status) {
     double none = 0;
-    for (uint32_t i = 0; i < j->left_out.m.count; ++i)
-      none += isfinite(n[1][i]) ? 0 : 100.0 / j->left_out.m.count;
+    uint32_t judged_rows = j->sought.m.count + j->left_out.m.count;
+    for (uint32_t i = 0; i < judged_rows; ++i) {
+      bool sought = i < j->sought.m.count;
+      none += isfinite(sought ? n[0][i] : n[1][i - j->sought.m.count]) ? 0 : 100.0 / judged_rows;
+    }
     const double cells[] = {r.parameter_count,
                             percent_at(&j->sought.m, n[0], "linear"),
                             percent_at(&j->sought.m, n[0], "point"),
@@ -139,6 +149,7 @@ static sonde_status measure_kind(const paper *p, sonde_model_kind kind, const ch
                             percent_at(&j->left_out.m, n[1], NULL),
                             percent_at(&j->third.m, n[2], NULL),
                             none,
+                            percent_of_all(&j->sought.m, n[0]),
                             r.fit_s,
                             r.node_count,
                             setup_ms,
@@ -171,6 +182,7 @@ static sonde_status add_two_layer(const paper *p, const judged *j, int stage, co
                             percent_at(&j->left_out.m, n[1], NULL),
                             NAN,
                             0,
+                            percent_at(&j->sought.m, n[0], NULL),
                             p->fit.seconds[stage],
                             p->model->surface.vertex_count,
                             setup_ms,
@@ -263,7 +275,7 @@ static sonde_status measure_condensed(const paper *p, paper_table *table,
   if (!status) {
     static const char *const LIKE_LINEAR[] = {"parameters",   "linear_percent",   "point_percent",
                                               "both_percent", "left_out_percent", "third_percent",
-                                              "none_percent"};
+                                              "none_percent", "all_percent"};
     enum { LIKE = sizeof LIKE_LINEAR / sizeof *LIKE_LINEAR };
     double cells[LIKE + 4] = {0};
     for (int k = 0; k < LIKE; ++k) cells[k] = paper_cell(table, "linear", LIKE_LINEAR[k]);
@@ -289,7 +301,8 @@ sonde_status paper_bulk(paper *p, sonde_error *error) {
       p, "volumetric", "Models through the volume on the same measurements",
       "parameters|parameters\nlinear_percent|linear, %\npoint_percent|point, %\n"
       "both_percent|both, %\nleft_out_percent|sites left out, %\nthird_percent|third footprint, %\n"
-      "none_percent|no equilibrium, %\nestimate_s|estimation, s\nnodes|nodes\nsetup_ms|set-up, ms\n"
+      "none_percent|no equilibrium, %\nall_percent|both, these as no force, "
+      "%\nestimate_s|estimation, s\nnodes|nodes\nsetup_ms|set-up, ms\n"
       "step_ms|step, ms");
   judged j = {0};
   uint32_t sites = p->quick ? 1 : 4;
@@ -302,7 +315,9 @@ sonde_status paper_bulk(paper *p, sonde_error *error) {
       "%u of fitted sites (linear, point, both), %u of sites left out, %u of the third "
       "footprint. Volumetric models have one set of moduli for the whole thigh, sought on three of "
       "these sites; the two-layer models have numbers for every site, fitted to all of "
-      "them. No equilibrium: rows of sites left out that have no force. Step: median "
+      "them. No equilibrium: rows of fitted sites and of sites left out that have no force and "
+      "count in the last "
+      "error only. Step: median "
       "processor time with the flat probe going in.",
       j.sought.m.count, j.left_out.m.count, j.third.m.count);
   if (!status)

@@ -111,7 +111,8 @@ enum {
   SONDE_SCENE_NOT_CONVERGED = 1u << 1, /**< the solver hit its iteration limit */
   SONDE_SCENE_CONTACT_FULL = 1u << 2,  /**< more contact than there was room for */
   SONDE_SCENE_SUBSTEP_LIMIT = 1u << 3, /**< the smallest substep missed the tolerance */
-  SONDE_SCENE_INVERTED = 1u << 4,      /**< a deformable body is inside out, or a part of it */
+  SONDE_SCENE_INVERTED = 1u << 4,      /**< a deformable body is inside out, or a part of it, or
+                                            its surface went through itself */
   SONDE_SCENE_PASSED = 1u << 5,        /**< a body went through another */
   SONDE_SCENE_INSIDE = 1u << 6,        /**< a body was found wholly inside another */
   SONDE_SCENE_FLAGS = 7                /**< how many there are */

@@ -53,7 +53,7 @@ list+=" $(checks_of elements_slower_at_equal_error 'two_layer_step_ms:number lin
 for row in two_layer_shear linear condensed; do
   list+=" tables.equal_error.rows.$row.middle_percent<=8 tables.equal_error.rows.$row.equal_nodes:number"
 done
-list+=" tables.volumetric.rows.condensed.nodes<=2500 tables.volumetric.rows.condensed.step_ms:number"
+list+=" tables.volumetric.rows.condensed.all_percent:number tables.volumetric.rows.condensed.nodes<=2500 tables.volumetric.rows.condensed.step_ms:number"
 gives "$list" paper "$MODEL" -o paper --quick --json
 
 [[ ! -s $err ]] || wrong "sonde paper says something in a pipe"

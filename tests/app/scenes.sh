@@ -17,7 +17,7 @@ span=$(grep '^<path' fallen.svg | grep -o '[ML][0-9.]*' | tr -d ML | sort -n | a
 run simulate "$hostile/sheet.yaml" -o sheet --no-frames --json
 checks=$((checks + 1))
 ((status == 1)) || wrong "the sheet: exit $status, expected 1"
-grep -q 'cannot be trusted: sheet turned inside out at 0.06[0-9]* s' "$err" || wrong "the sheet is not named"
+grep -q 'cannot be trusted: sheet turned inside out or went through itself at 0.06[0-9]* s' "$err" || wrong "the sheet is not named"
 "$CHECK_JSON" flagged_steps\>=1 trusted:bool trouble:text <"$out" || wrong "the sheet: JSON"
 [[ $(wc -l <sheet/bodies.csv) -ge 100 ]] || wrong "the sheet left no table"
 # What begins inside another is told and is no fault.

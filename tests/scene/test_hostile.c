@@ -203,6 +203,18 @@ static void test_inside_any_kind(void **unused) {
 // ---- inside out, and through
 
 // The sheet's sides pass through each other as it meets the ball: 0.0624 s of fall.
+// A flap alone, whose ends are pushed through its middle: every volume stays positive, nothing
+// touches.
+static void test_goes_through_itself(void **unused) {
+  (void)unused;
+  world w = world_at("folded");
+  steps(&w, 8);
+  assert_unflagged(&w);
+  steps(&w, 92);
+  assert_event(&w, SONDE_SCENE_INVERTED, "flap", NULL, 0.008, 0.05);
+  world_end(&w);
+}
+
 static void test_sheet_inside_out(void **unused) {
   (void)unused;
   world w = world_at("sheet");
@@ -280,9 +292,13 @@ static void test_pressed_through(void **unused) {
 
 int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_hundred),           cmocka_unit_test(test_ball_inside_block),
-      cmocka_unit_test(test_inside_any_kind),   cmocka_unit_test(test_sheet_inside_out),
-      cmocka_unit_test(test_volume_below_zero), cmocka_unit_test(test_passed),
+      cmocka_unit_test(test_hundred),
+      cmocka_unit_test(test_ball_inside_block),
+      cmocka_unit_test(test_inside_any_kind),
+      cmocka_unit_test(test_sheet_inside_out),
+      cmocka_unit_test(test_goes_through_itself),
+      cmocka_unit_test(test_volume_below_zero),
+      cmocka_unit_test(test_passed),
       cmocka_unit_test(test_pressed_through),
   };
   if (argc > 1) cmocka_set_test_filter(argv[1]);

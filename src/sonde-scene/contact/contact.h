@@ -69,6 +69,14 @@ sonde_bounds sonde_face_tree_bounds(const sonde_face_tree *tree);
 uint32_t sonde_face_tree_pairs(const sonde_face_tree *a, const sonde_face_tree *b, double margin_m,
                                uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work);
 
+/**
+ * Whether the mesh crosses itself: an edge of one face passes through the inside of another that
+ * shares at most one corner with it.
+ * @param[out] faces of the first such pair, the lower number first
+ * @thread tick
+ */
+bool sonde_face_tree_crosses(const sonde_face_tree *tree, uint32_t faces[2]);
+
 /** A point of a mesh and the way to it from a point beside it. */
 typedef struct sonde_face_point {
   uint32_t face;

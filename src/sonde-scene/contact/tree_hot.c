@@ -79,6 +79,51 @@ uint32_t sonde_face_tree_pairs(const sonde_face_tree *a, const sonde_face_tree *
   return count;
 }
 
+// Whether an edge of a passes through the inside of b, by signs of volumes: its ends lie on
+// different sides, and its line passes within the three edges of b.
+static bool edges_cross(const sonde_vec3 *x, const uint32_t a[3], const uint32_t b[3]) {
+  const sonde_vec3 t[3] = {x[b[0]], x[b[1]], x[b[2]]};
+  for (int k = 0; k < 3; ++k) {
+    uint32_t p = a[k], q = a[(k + 1) % 3];
+    bool touches = p == b[0] || p == b[1] || p == b[2] || q == b[0] || q == b[1] || q == b[2];
+    if (touches) continue;
+    sonde_vec3 d = v_sub(x[q], x[p]), n = v_cross(v_sub(t[1], t[0]), v_sub(t[2], t[0]));
+    if (!(v_dot(n, v_sub(x[p], t[0])) * v_dot(n, v_sub(x[q], t[0])) < 0)) continue;
+    int left = 0, right = 0;
+    for (int i = 0; i < 3; ++i) {
+      double side = v_dot(d, v_cross(v_sub(t[i], x[p]), v_sub(t[(i + 1) % 3], x[p])));
+      left += side > 0;
+      right += side < 0;
+    }
+    if (left == 3 || right == 3) return true;
+  }
+  return false;
+}
+
+bool sonde_face_tree_crosses(const sonde_face_tree *tree, uint32_t faces[2]) {
+  tree_pairs stack = {.depth = 0};
+  SONDE_ASSERT(tree != NULL && faces != NULL);
+  tree_push(&stack, 0, 0);
+  while (stack.depth) {
+    uint32_t at_a = stack.at[--stack.depth][0], at_b = stack.at[stack.depth][1];
+    const tree_node *na = &tree->nodes[at_a], *nb = &tree->nodes[at_b];
+    if (!bounds_meet(&na->box, &nb->box, 0)) continue;
+    if (tree_open(&stack, tree, at_a, tree, at_b)) continue;
+    for (uint32_t i = na->first; i < na->first + na->count; ++i)
+      for (uint32_t j = nb->first; j < nb->first + nb->count; ++j) {
+        const uint32_t *a = tree->corners[i], *b = tree->corners[j];
+        sonde_bounds box = face_bounds(tree, i), other = face_bounds(tree, j);
+        int common = 0;
+        for (int k = 0; k < 9; ++k) common += a[k / 3] == b[k % 3];
+        if (tree->face[i] >= tree->face[j] || common > 1 || !bounds_meet(&box, &other, 0)) continue;
+        if (!edges_cross(tree->vertices, a, b) && !edges_cross(tree->vertices, b, a)) continue;
+        faces[0] = tree->face[i], faces[1] = tree->face[j];
+        return true;
+      }
+  }
+  return false;
+}
+
 static double box_distance2(const sonde_bounds *box, sonde_vec3 p) {
   double x = fmax(fmax(box->low.x - p.x, p.x - box->high.x), 0);
   double y = fmax(fmax(box->low.y - p.y, p.y - box->high.y), 0);

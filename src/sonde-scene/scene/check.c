@@ -32,28 +32,6 @@ sonde_status sonde_mesh_check_areas(const sonde_mesh *mesh, sonde_error *error) 
   return SONDE_OK;
 }
 
-// Whether an edge of a passes through the inside of b, by signs of volumes: its ends lie on
-// different sides, and its line passes within the three edges of b.
-static bool edges_cross(const sonde_mesh *mesh, const uint32_t a[3], const uint32_t b[3]) {
-  const sonde_vec3 *x = mesh->vertices;
-  const sonde_vec3 t[3] = {x[b[0]], x[b[1]], x[b[2]]};
-  for (int k = 0; k < 3; ++k) {
-    uint32_t p = a[k], q = a[(k + 1) % 3];
-    bool touches = p == b[0] || p == b[1] || p == b[2] || q == b[0] || q == b[1] || q == b[2];
-    if (touches) continue;
-    sonde_vec3 d = v_sub(x[q], x[p]), n = v_cross(v_sub(t[1], t[0]), v_sub(t[2], t[0]));
-    if (!(v_dot(n, v_sub(x[p], t[0])) * v_dot(n, v_sub(x[q], t[0])) < 0)) continue;
-    int left = 0, right = 0;
-    for (int i = 0; i < 3; ++i) {
-      double side = v_dot(d, v_cross(v_sub(t[i], x[p]), v_sub(t[(i + 1) % 3], x[p])));
-      left += side > 0;
-      right += side < 0;
-    }
-    if (left == 3 || right == 3) return true;
-  }
-  return false;
-}
-
 sonde_status sonde_mesh_check_solid(const sonde_mesh *mesh, sonde_error *error) {
   sonde_mesh_report report;
   sonde_status status = sonde_mesh_inspect(mesh, &report, error);
@@ -67,28 +45,12 @@ sonde_status sonde_mesh_check_solid(const sonde_mesh *mesh, sonde_error *error) 
                       report.volume_m3 * 1e9);
   status = sonde_mesh_check_areas(mesh, error);
   if (status) return status;
-  // Pairs of triangles with less than two corners in common must not cross.
   sonde_face_tree *tree = NULL;
-  uint32_t count = 0, (*pairs)[2] = NULL;
+  uint32_t faces[2];
   status = sonde_face_tree_create(mesh, &tree, error);
-  if (!status) {
-    count = sonde_face_tree_pairs(tree, tree, 0, NULL, 0, NULL);
-    pairs = sonde_calloc(count, sizeof *pairs);
-    if (pairs)
-      sonde_face_tree_pairs(tree, tree, 0, pairs, count, NULL);
-    else
-      status = sonde_fail_memory(error);
-  }
-  for (uint32_t k = 0; k < count && !status; ++k) {
-    if (pairs[k][0] >= pairs[k][1]) continue;
-    const uint32_t *a = mesh->faces[pairs[k][0]], *b = mesh->faces[pairs[k][1]];
-    int common = 0;
-    for (int i = 0; i < 9; ++i) common += a[i / 3] == b[i % 3];
-    if (common < 2 && (edges_cross(mesh, a, b) || edges_cross(mesh, b, a)))
-      status = sonde_fail(error, SONDE_MESH, "the surface cuts itself: triangles %u and %u",
-                          pairs[k][0], pairs[k][1]);
-  }
-  sonde_free(pairs);
+  if (!status && sonde_face_tree_crosses(tree, faces))
+    status = sonde_fail(error, SONDE_MESH, "the surface cuts itself: triangles %u and %u", faces[0],
+                        faces[1]);
   sonde_face_tree_destroy(tree);
   SONDE_ASSERT(status == SONDE_OK || !error || error->message[0]);
   return status;

@@ -189,6 +189,15 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   return SONDE_OK;
 }
 
+// A tree of a body's faces as they are at the start, unless there is one.
+static sonde_status make_tree(sonde_scene_state *state, uint32_t b, sonde_error *error) {
+  if (state->tree[b]) return SONDE_OK;
+  sonde_mesh start = state->scene->bodies[b].surface;
+  start.vertices = state->surface + state->surface_first[b];
+  sonde_surface_at(state, b, state->now.position, state->now.rotation, start.vertices);
+  return sonde_face_tree_create(&start, &state->tree[b], error);
+}
+
 // The common volumes of all pairs are found one after the other in the same memory, which has room
 // for the largest pair: large faces of rigid bodies carry three columns per piece, others one.
 static sonde_status make_overlaps(sonde_scene_state *state, sonde_error *error) {
@@ -208,15 +217,14 @@ static sonde_status make_overlaps(sonde_scene_state *state, sonde_error *error) 
       pieces += 16 * mesh->face_count;
       if (mesh->face_count > config[k].max_faces) config[k].max_faces = mesh->face_count;
       if (mesh->vertex_count > config[k].max_vertices) config[k].max_vertices = mesh->vertex_count;
-      if (state->tree[ends[s]]) continue;
-      sonde_mesh start = *mesh;
-      start.vertices = state->surface + state->surface_first[ends[s]];
-      sonde_surface_at(state, ends[s], state->now.position, state->now.rotation, start.vertices);
-      status = sonde_face_tree_create(&start, &state->tree[ends[s]], error);
+      status = make_tree(state, ends[s], error);
     }
     if (pieces > config[k].max_pieces) config[k].max_pieces = pieces;
     tree[k] = state->tree[touch->a];
   }
+  // What may go through itself is looked at without others, too.
+  for (uint32_t b = 0; b < scene->body_count && !status; ++b)
+    if (!sonde_body_is_rigid(&scene->bodies[b])) status = make_tree(state, b, error);
   for (int k = 0; k < 2 && !status; ++k) {
     if (!tree[k]) continue;
     if (config[k].max_pieces < PIECES_LEAST) config[k].max_pieces = PIECES_LEAST;

@@ -104,6 +104,7 @@ void sonde_trouble_way(sonde_scene_state *state, uint32_t t, double h) {
   sonde_scene_note(state, SONDE_SCENE_PASSED, touch->b, touch->a);
 }
 
+enum { CROSSED_EVENT = 4 }; // the bit of SONDE_SCENE_INVERTED
 void sonde_trouble_inspect(sonde_scene_state *state) {
   for (uint32_t b = 0; b < state->scene->body_count; ++b) {
     const sonde_body *body = &state->scene->bodies[b];
@@ -112,5 +113,21 @@ void sonde_trouble_inspect(sonde_scene_state *state) {
       continue;
     double volume = sonde_network_volume(body, state->now.position + body->first_slot);
     if (!(volume > 0)) sonde_scene_note(state, SONDE_SCENE_INVERTED, b, UINT32_MAX);
+  }
+  // Nothing pushes the sides of one body apart. Whether a surface went through itself is looked at
+  // every tenth step, until it was found.
+  enum { CROSSED_PERIOD = 10 };
+  bool due = (state->now.head->tick + 1) % CROSSED_PERIOD == 0;
+  for (uint32_t b = 0; due && b < state->scene->body_count; ++b) {
+    const sonde_body *body = &state->scene->bodies[b];
+    bool layers = body->model && !body->model->bulk;
+    if (sonde_body_is_rigid(body) || layers || !state->tree[b] || state->now.asleep[b]) continue;
+    if (state->now.head->event[CROSSED_EVENT].count) continue;
+    uint32_t faces[2];
+    sonde_vec3 *surface = state->surface + state->surface_first[b];
+    sonde_surface_at(state, b, state->now.position, state->now.rotation, surface);
+    sonde_face_tree_refit(state->tree[b], surface);
+    if (sonde_face_tree_crosses(state->tree[b], faces))
+      sonde_scene_note(state, SONDE_SCENE_INVERTED, b, UINT32_MAX);
   }
 }
