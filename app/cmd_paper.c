@@ -27,18 +27,13 @@ static const struct {
   const char *what;
   sonde_status (*work)(paper *, sonde_error *);
   double seconds;
-} PARTS[] = {{"drawing the curves", paper_curves, 1},
-             {"fitting the thigh", paper_fit, 25},
-             {"comparing models", paper_models, 70},
-             {"filling the thigh", paper_bulk, 300},
-             {"refining the thigh", paper_equal, 60},
-             {"drawing probes and springs", paper_drawings, 1},
-             {"pressing the thigh", paper_pressed, 40},
-             {"sweeping the thigh", paper_sweep, 15},
-             {"dropping a ball", paper_collision, 25},
-             {"comparing time steps", paper_steps, 60},
-             {"comparing solvers", paper_solvers, 25},
-             {"timing frames", paper_speed, 15}};
+} PARTS[] = {
+    {"drawing the curves", paper_curves, 1},   {"fitting the thigh", paper_fit, 25},
+    {"comparing models", paper_models, 70},    {"filling the thigh", paper_bulk, 300},
+    {"refining the thigh", paper_equal, 60},   {"drawing probes and springs", paper_drawings, 1},
+    {"pressing the thigh", paper_pressed, 40}, {"sweeping the thigh", paper_sweep, 15},
+    {"dropping a ball", paper_collision, 25},  {"comparing time steps", paper_steps, 60},
+    {"comparing solvers", paper_solvers, 25},  {"timing frames", paper_speed, 15}};
 enum { PART_COUNT = sizeof PARTS / sizeof *PARTS };
 
 // Measurements and sites as the model file keeps them; with `quick` those of every fourth site.
