@@ -211,7 +211,8 @@ bool sonde_interior_stress(const sonde_interior *in, sonde_vec3 rest, sonde_mat3
   sonde_column_point at;
   *stress = m_zero();
   if (!in->solid || !sonde_interior_locate(in, rest, &at)) return false;
-  if (at.depth_m < 0 || sonde_interior_in_bone(in, rest, &at)) return false;
+  // A limb's column calls bone what lies below an outer bone: vessels there take the stress on it.
+  if (at.depth_m < 0 || (in->bone == NULL && at.r <= at.bone_m)) return false;
   sonde_mat3 local, world_from_leg = m_columns(in->e1, in->e2, in->axis);
   if (!sonde_window_stress(in->live, at.theta, at.s, at.r, &local)) return false;
   *stress = m_mul(world_from_leg, m_mul(local, m_transpose(world_from_leg)));

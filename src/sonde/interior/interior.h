@@ -225,7 +225,7 @@ void sonde_interior_displacements(const sonde_interior *interior, uint32_t count
                                   const sonde_vec3 *rest_m, sonde_vec3 *out_m);
 // Cauchy stress (Pa, tension positive, world axes) at a rest point, scaled so that the solid's
 // reaction is the contact force; without vessels. @return false (zero stress) where the solid does
-// not reach: no contact, outside the leg or its window, in bone. @thread any
+// not reach: no contact, outside the leg or its window, in a thigh's bone. @thread any
 bool sonde_interior_stress(const sonde_interior *interior, sonde_vec3 rest_m, sonde_mat3 *stress);
 // Sections of the vein (0), the artery (1) or a branch; 0 when the leg lacks it.
 // @thread any, not during an update
