@@ -39,7 +39,7 @@ typedef struct sonde_landmark {
 
 /** A stretch of the femoral vein by model z. */
 typedef struct sonde_segment {
-  char name[32]; /**< common_femoral, femoral_proximal, femoral_mid, femoral_distal, popliteal_near
+  char name[32]; /**< common_femoral, femoral_proximal, femoral_mid, femoral_distal, popliteal
                   */
   double from_m, to_m;
 } sonde_segment;

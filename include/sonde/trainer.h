@@ -10,6 +10,7 @@
 #include "sonde/anatomy.h"
 #include "sonde/exam.h"
 #include "sonde/interior_findings.h"
+#include "sonde/limb_model.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -82,7 +83,8 @@ typedef enum sonde_case_level {
 typedef enum sonde_case_thigh {
   SONDE_CASE_BUNDLED,   /**< the model that ships with the program */
   SONDE_CASE_GENERATED, /**< from a seed and what is known */
-  SONDE_CASE_MODEL      /**< a model file, relative to the case file */
+  SONDE_CASE_MODEL,     /**< a model file, relative to the case file */
+  SONDE_CASE_LEG        /**< a whole limb from a seed and what is known */
 } sonde_case_thigh;
 
 typedef enum sonde_decision {
@@ -128,7 +130,8 @@ typedef struct sonde_case {
   char note[1024];    /**< for teaching, after the exam */
   sonde_case_thigh thigh;
   uint64_t seed;
-  sonde_thigh known; /**< parameters that are not drawn */
+  sonde_thigh known;   /**< parameters that are not drawn */
+  sonde_limb_body leg; /**< the same of a limb */
   char model[256];
   sonde_circulation circulation;
   sonde_pathology pathology; /**< of the femoral vein; extent below */

@@ -255,7 +255,7 @@ static void check_topography(const sonde_model *model) {
 static void check_names(const sonde_model *model) {
   static const char *const NAME[] = {
       "common_femoral", "saphenofemoral_junction", "femoral_confluence", "femoral_proximal",
-      "femoral_mid",    "femoral_distal",          "popliteal_near"};
+      "femoral_mid",    "femoral_distal",          "popliteal"};
   const sonde_thigh_anatomy *a = model->anatomy;
   double last = 0;
   for (size_t k = 0; k < SONDE_COUNT_OF(NAME); ++k) {

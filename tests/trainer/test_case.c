@@ -20,7 +20,7 @@ static const char GOOD[] = "sonde_case: 2\n"
                            "  diagnosis: A clot\n"
                            "  segments: {common_femoral: compressible, femoral_proximal: "
                            "compressible, femoral_mid: clot, femoral_distal: compressible, "
-                           "popliteal_near: compressible}\n";
+                           "popliteal: compressible}\n";
 
 // The good text with one piece replaced.
 static char *changed(const char *from, const char *to) {

@@ -30,7 +30,7 @@ static struct {
 
 static void make_map(void) {
   static const char *const NAMES[] = {"common_femoral", "femoral_proximal", "femoral_mid",
-                                      "femoral_distal", "popliteal_near"};
+                                      "femoral_distal", "popliteal"};
   static const double TO[] = {0.04, 0.12, 0.20, 0.26, 0.30};
   made.map = (sonde_vein_map){.segment_count = 5, .point_count = POINTS, .length_m = 0.3};
   for (uint32_t i = 0; i < POINTS; ++i)

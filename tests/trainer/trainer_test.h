@@ -22,7 +22,7 @@
   } while (0)
 
 static const char *const TEST_SEGMENTS[] = {"common_femoral", "femoral_proximal", "femoral_mid",
-                                            "femoral_distal", "popliteal_near"};
+                                            "femoral_distal", "popliteal"};
 
 // Five segments of 40 mm along z, 20 mm below a flat skin that looks to +x.
 static inline sonde_vein_map straight_map(void) {

@@ -55,7 +55,7 @@ static sonde_status name_parts(const sonde_thigh *thigh, const sonde_thigh_shape
   mark(model, thigh, shape, "femoral_proximal", 0.35);
   mark(model, thigh, shape, "femoral_mid", 0.5);
   mark(model, thigh, shape, "femoral_distal", 0.75);
-  mark(model, thigh, shape, "popliteal_near", 0.94);
+  mark(model, thigh, shape, "popliteal", 0.94);
   const struct {
     const char *name;
     double to;
@@ -63,7 +63,7 @@ static sonde_status name_parts(const sonde_thigh *thigh, const sonde_thigh_shape
                  {"femoral_proximal", fmax(0.4, meet + 0.05)},
                  {"femoral_mid", 0.65},
                  {"femoral_distal", 0.88},
-                 {"popliteal_near", 1}};
+                 {"popliteal", 1}};
   a->segment_count = (uint32_t)SONDE_COUNT_OF(segment);
   for (uint32_t k = 0; k < a->segment_count; ++k) {
     snprintf(a->segment[k].name, sizeof a->segment[k].name, "%s", segment[k].name);

@@ -164,7 +164,7 @@ static sonde_status draw_panel(panel *p, const sonde_model *model, const sonde_l
 }
 
 sonde_status sonde_thigh_sections(const sonde_model *model, const char *path, sonde_error *error) {
-  static const char *const MARK[] = {"common_femoral", "femoral_mid", "popliteal_near"};
+  static const char *const MARK[] = {"common_femoral", "femoral_mid", "popliteal"};
   enum { PANELS = SONDE_COUNT_OF(MARK) };
   SONDE_ASSERT(model && path);
   if (!model->anatomy) return sonde_fail(error, SONDE_ARGUMENT, "the model has no named anatomy");

@@ -2,13 +2,13 @@
 #ifndef SONDE_SRC_TRAINER_CASE_H
 #define SONDE_SRC_TRAINER_CASE_H
 
-#include "sonde/limb_model.h"
 #include "trainer/trainer.h"
 
 extern const char *const sonde_case_levels[];   // NULL-terminated, in the order of the enum
 extern const char *const sonde_case_postures[]; // likewise
 extern const char *const sonde_case_lesions[];
 extern const char *const sonde_case_sexes[];
+extern const char *const sonde_case_sides[];
 
 // Everything that needs no model; a sentence without place.
 sonde_status sonde_case_check(const sonde_case *of, sonde_error *error);

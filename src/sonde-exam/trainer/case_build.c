@@ -22,6 +22,14 @@ static sonde_status get_model(const sonde_case *from, const char *bundled, const
     sonde_thigh_shape_destroy(shape);
     return status;
   }
+  if (from->thigh == SONDE_CASE_LEG) {
+    sonde_limb_body body;
+    sonde_limb_model_def def = sonde_limb_model_def_default();
+    def.name = from->id;
+    def.provenance = "Synthetic limb of a training case";
+    sonde_status status = sonde_limb_draw(&from->leg, from->seed, &body, error);
+    return status ? status : sonde_limb_model(&body, &def, model, error);
+  }
   if (from->thigh == SONDE_CASE_BUNDLED) {
     if (bundled) return sonde_limb_model_load(bundled, model, error);
     return sonde_fail(error, SONDE_NOT_FOUND, "case %s needs the bundled thigh", from->id);

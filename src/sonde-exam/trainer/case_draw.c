@@ -6,7 +6,7 @@
 #include <string.h>
 
 static const char *const SEGMENTS[] = {"common_femoral", "femoral_proximal", "femoral_mid",
-                                       "femoral_distal", "popliteal_near"};
+                                       "femoral_distal", "popliteal"};
 enum { SEGMENT_COUNT = 5 };
 
 typedef struct draw {
@@ -63,13 +63,13 @@ void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out)
     out->truth[i] = SONDE_DECISION_COMPRESSIBLE;
   }
 
-  // The person: sex, fat in front of the thigh, a second vein, posture.
+  // The person: sex, side, build, posture.
   bool hard = level == SONDE_CASE_HARD;
-  out->thigh = SONDE_CASE_GENERATED;
+  out->thigh = SONDE_CASE_LEG;
   out->seed = seed & UINT32_MAX;
-  out->known.sex = below(&d, 2) ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
-  out->known.fat_front_m = 1e-3 * rounded(hard ? uniform(&d, 4, 6) : uniform(&d, 4, 6.5), 10);
-  out->known.second_vein = hard && below(&d, 4) == 0;
+  out->leg.sex = below(&d, 2) ? SONDE_SEX_FEMALE : SONDE_SEX_MALE;
+  out->leg.side = below(&d, 2) ? SONDE_LIMB_LEFT : SONDE_LIMB_RIGHT;
+  out->leg.bmi = rounded(hard ? uniform(&d, 19, 32) : uniform(&d, 19, 26), 10);
   if (hard && below(&d, 4) == 0) out->circulation.posture = SONDE_POSTURE_SITTING;
 
   bool clot = below(&d, 2) == 0;
@@ -106,12 +106,14 @@ void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out)
       "Walks without help.", "Takes no tablets.", "Has had a thrombosis of the other leg.",
       "The leg is a little warmer than the other.", "Otherwise well."};
   char what[80];
-  uint32_t age = 24 + below(&d, 60), days = 2 + below(&d, 9);
+  uint32_t age = 24 + below(&d, 60);
+  out->leg.age_y = age;
+  uint32_t days = 2 + below(&d, 9);
   const char *format = COMPLAINT[below(&d, SONDE_COUNT_OF(COMPLAINT))];
   const char *at = strstr(format, "%u");
   SONDE_ASSERT(at != NULL);
   snprintf(what, sizeof what, "%.*s%u%s", (int)(at - format), format, days, at + 2);
   snprintf(out->history, sizeof out->history, "%s, %u years, with %s. %s",
-           out->known.sex == SONDE_SEX_FEMALE ? "Woman" : "Man", age, what,
+           out->leg.sex == SONDE_SEX_FEMALE ? "Woman" : "Man", age, what,
            MORE[below(&d, SONDE_COUNT_OF(MORE))]);
 }

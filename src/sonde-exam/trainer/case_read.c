@@ -10,6 +10,7 @@ const char *const sonde_case_levels[] = {"first", "easy", "hard", NULL};
 const char *const sonde_case_postures[] = {"supine", "sitting", "standing", NULL};
 const char *const sonde_case_lesions[] = {"node", "cyst", "haematoma", NULL};
 const char *const sonde_case_sexes[] = {"drawn", "female", "male", NULL};
+const char *const sonde_case_sides[] = {"right", "left", NULL};
 static const char *const DECISIONS[] = {"", "compressible", "clot", "not_seen"};
 
 static const double UNKNOWN = (double)NAN;
@@ -35,6 +36,7 @@ bool sonde_decision_parse(const char *name, sonde_decision *decision) {
 
 sonde_case sonde_case_default(void) {
   sonde_case c = {.known = sonde_thigh_unknown(),
+                  .leg = sonde_limb_unknown(),
                   .circulation = sonde_circulation_default(),
                   .extent.whole = true};
   sonde_status status = sonde_pathology_preset("healthy", &c.pathology, NULL);
@@ -44,12 +46,48 @@ sonde_case sonde_case_default(void) {
 
 // ---- the patient
 
+// Parameters that a map gives, in their units at the boundary.
+static void read_parameters(sonde_reader *reader, sonde_place at, const char *what,
+                            const char *const *more, const sonde_parameter *parameter,
+                            uint32_t count, void *to) {
+  enum { KEYS = 48 };
+  const char *keys[KEYS] = {0};
+  uint32_t used = 0;
+  for (; *more; ++more) keys[used++] = *more;
+  SONDE_ASSERT(used + count < KEYS);
+  for (uint32_t i = 0; i < count; ++i) keys[used++] = parameter[i].name;
+  sonde_read_keys(reader, at, what, keys);
+  for (uint32_t i = 0; i < count; ++i) {
+    const sonde_parameter *p = &parameter[i];
+    if (!sonde_read_find(reader, at, p->name)) continue;
+    double value =
+        sonde_read_real(reader, at, p->name, p->low / p->unit, p->high / p->unit, UNKNOWN);
+    *sonde_parameter_of(to, p) = value * p->unit;
+  }
+}
+
+// A whole limb from a seed and what is known of the body.
+static void read_leg(sonde_reader *reader, sonde_place at, sonde_case *c) {
+  static const char *const MORE[] = {"seed", "sex", "side", NULL};
+  uint32_t count;
+  const sonde_parameter *parameter = sonde_limb_parameters(&count);
+  read_parameters(reader, at, "leg", MORE, parameter, count, &c->leg);
+  c->thigh = SONDE_CASE_LEG;
+  c->seed = sonde_read_integer(reader, at, "seed", 0, UINT32_MAX, 1);
+  c->leg.sex = (sonde_sex)sonde_read_choice(reader, at, "sex", sonde_case_sexes, 0);
+  c->leg.side = (sonde_limb_side)sonde_read_choice(reader, at, "side", sonde_case_sides, 0);
+}
+
 // The bundled thigh, a model file, or one that is generated from a seed and what is known of it.
 static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
-  enum { KEYS = 40 };
   static const char *const MODEL[] = {"model", NULL};
   sonde_place at = sonde_read_find(reader, root, "thigh");
-  if (!at) return;
+  sonde_place leg = sonde_read_find(reader, root, "leg");
+  if (leg && at)
+    sonde_reader_fail(reader, leg, SONDE_FORMAT, "give either leg or thigh");
+  else if (leg)
+    read_leg(reader, leg, c);
+  if (!at || leg) return;
   if (sonde_read_is_text(reader, at)) {
     const char *text = sonde_read_text_at(reader, at, "thigh");
     if (text && strcmp(text, "bundled") != 0)
@@ -63,22 +101,13 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
     sonde_read_member(reader, at, "model", true, c->model, sizeof c->model);
     return;
   }
-  const char *keys[KEYS] = {"seed", "sex"};
+  static const char *const MORE[] = {"seed", "sex", NULL};
   uint32_t count;
   const sonde_parameter *parameter = sonde_thigh_parameters(&count);
-  SONDE_ASSERT(count + 3 <= KEYS);
-  for (uint32_t i = 0; i < count; ++i) keys[2 + i] = parameter[i].name;
-  sonde_read_keys(reader, at, "thigh", keys);
+  read_parameters(reader, at, "thigh", MORE, parameter, count, &c->known);
   c->thigh = SONDE_CASE_GENERATED;
   c->seed = sonde_read_integer(reader, at, "seed", 0, UINT32_MAX, 1);
   c->known.sex = (sonde_sex)sonde_read_choice(reader, at, "sex", sonde_case_sexes, 0);
-  for (uint32_t i = 0; i < count; ++i) {
-    const sonde_parameter *p = &parameter[i];
-    if (!sonde_read_find(reader, at, p->name)) continue;
-    double value =
-        sonde_read_real(reader, at, p->name, p->low / p->unit, p->high / p->unit, UNKNOWN);
-    *sonde_parameter_of(&c->known, p) = value * p->unit;
-  }
 }
 
 // ---- pathology
@@ -175,8 +204,9 @@ static void read_pathology(sonde_reader *reader, sonde_place root, sonde_case *c
 
 static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
   static const char *const KEYS[] = {"thrombosis", "diagnosis", "segments", "look_alikes", NULL};
-  static const char *const NAMES[] = {"common_femoral", "femoral_proximal", "femoral_mid",
-                                      "femoral_distal", "popliteal_near",   NULL};
+  static const char *const NAMES[] = {
+      "common_femoral", "femoral_proximal", "femoral_mid", "femoral_distal",
+      "popliteal",      "popliteal_near",   NULL};
   static const char *const WORDS[] = {"compressible", "clot", NULL};
   sonde_place at = sonde_read_find(reader, root, "truth");
   if (!at) {
@@ -194,7 +224,9 @@ static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
     if (!sonde_read_find(reader, segments, NAMES[i])) continue;
     int word = sonde_read_choice(reader, segments, NAMES[i], WORDS, 0);
     SONDE_ASSERT(c->truth_count < SONDE_SEGMENTS);
-    snprintf(c->truth_segment[c->truth_count], sizeof c->truth_segment[0], "%s", NAMES[i]);
+    const bool near = strcmp(NAMES[i], "popliteal_near") == 0; // of files about thighs
+    snprintf(c->truth_segment[c->truth_count], sizeof c->truth_segment[0], "%s",
+             near ? "popliteal" : NAMES[i]);
     c->truth[c->truth_count++] = word ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
   }
   sonde_place list = sonde_read_find(reader, at, "look_alikes");
@@ -235,8 +267,9 @@ sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *ou
   SONDE_ASSERT(text && name && out);
   static const char *const CIRCULATION[] = {"posture",       "breath_mmhg",   "valsalva_from_s",
                                             "valsalva_to_s", "valsalva_mmhg", NULL};
-  const char *keys[] = {"sonde_case",  "id",   "title",    "level", "history", "note", "thigh",
-                        "circulation", "vein", "findings", "truth", NULL,      NULL};
+  const char *keys[] = {"sonde_case", "id",    "title", "level",       "history",
+                        "note",       "thigh", "leg",   "circulation", "vein",
+                        "findings",   "truth", NULL,    NULL};
   sonde_reader *reader;
   *out = sonde_case_default();
   sonde_status status = sonde_reader_create(text, name, &reader, error);

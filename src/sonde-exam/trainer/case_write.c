@@ -38,6 +38,16 @@ static void put_clot(sonde_file *file, const char *before, const sonde_pathology
   put_station(file, "to", &extent->to);
 }
 
+// Parameters that are known.
+static void put_parameters(sonde_file *file, const sonde_parameter *p, uint32_t count,
+                           void *known) {
+  SONDE_ASSERT(p != NULL && known != NULL);
+  for (uint32_t i = 0; i < count; ++i) {
+    double value = *sonde_parameter_of(known, &p[i]);
+    if (isfinite(value)) sonde_file_printf(file, "  %s: %.12g\n", p[i].name, value / p[i].unit);
+  }
+}
+
 static void put_case(sonde_file *file, const sonde_case *c) {
   sonde_file_printf(file, "sonde_case: %d\n", SONDE_CASE_VERSION);
   put_quoted(file, "id: ", c->id);
@@ -54,10 +64,17 @@ static void put_case(sonde_file *file, const sonde_case *c) {
     uint32_t count;
     const sonde_parameter *p = sonde_thigh_parameters(&count);
     sonde_thigh known = c->known;
-    for (uint32_t i = 0; i < count; ++i) {
-      double value = *sonde_parameter_of(&known, &p[i]);
-      if (isfinite(value)) sonde_file_printf(file, "  %s: %.12g\n", p[i].name, value / p[i].unit);
-    }
+    put_parameters(file, p, count, &known);
+  }
+
+  if (c->thigh == SONDE_CASE_LEG) {
+    sonde_limb_body known = c->leg;
+    uint32_t count;
+    const sonde_parameter *p = sonde_limb_parameters(&count);
+    sonde_file_printf(file, "leg:\n  seed: %llu\n  sex: %s\n  side: %s\n",
+                      (unsigned long long)c->seed, sonde_case_sexes[known.sex],
+                      sonde_case_sides[known.side]);
+    put_parameters(file, p, count, &known);
   }
 
   const sonde_circulation *flow = &c->circulation;

@@ -38,6 +38,8 @@ void sonde_read_station(sonde_reader *reader, sonde_place at, const char *what,
     sonde_read_member(reader, at, "landmark", true, station->landmark, sizeof station->landmark);
   } else {
     sonde_read_member(reader, at, "segment", true, station->segment, sizeof station->segment);
+    // What files of cases call the vein above the knee, where a thigh ends.
+    if (strcmp(station->segment, "popliteal_near") == 0) strcpy(station->segment, "popliteal");
     station->share = sonde_read_real(reader, at, "share", 0, 1, 0.5);
   }
   station->shift_m = 1e-3 * sonde_read_real(reader, at, "shift_mm", -1000, 1000, 0);

@@ -162,14 +162,13 @@ static const char *const VEINS[] = {"external iliac vein", "common femoral vein"
 static const char *const ARTERIES[] = {"external iliac artery", "common femoral artery",
                                        "superficial femoral artery", "popliteal artery", NULL};
 
-// A name as files have it: "femoral vein, middle" -> "femoral_vein_middle". Saphenous veins go
+// A name as files have it: "deep femoral vein" -> "deep_femoral_vein". Saphenous veins go
 // without their last word, as those of a thigh, and so do names that are too long.
 static void name_of(const char *from, char to[32]) {
   enum { MOST = 31 };
   char all[64];
   size_t count = 0;
-  for (; *from && count + 1 < sizeof all; ++from)
-    if (*from != ',') all[count++] = *from == ' ' ? '_' : *from;
+  for (; *from && count + 1 < sizeof all; ++from) all[count++] = *from == ' ' ? '_' : *from;
   all[count] = '\0';
   char *last = strstr(all, "saphenous_vein");
   if (last && strlen(last) == strlen("saphenous_vein")) last[strlen("saphenous")] = '\0';
@@ -239,6 +238,14 @@ static void lay_sites(const sonde_limb *limb, const chain *veins,
   }
 }
 
+// Names of the stations as landmarks, those of a thigh where it has them.
+static const char *const LANDMARKS[] = {
+    "external_iliac",   "common_femoral",  "saphenofemoral_junction", "femoral_confluence",
+    "femoral_proximal", "femoral_mid",     "femoral_distal",          "adductor_canal",
+    "popliteal",        "trifurcation",    "posterior_tibial",        "peroneal",
+    "gastrocnemius",    "great_saphenous", "small_saphenous"};
+_Static_assert(SONDE_COUNT_OF(LANDMARKS) == SONDE_LIMB_STATIONS, "a name for each station");
+
 // Stations as landmarks, and stretches of the main vein.
 static void name_parts(const sonde_limb *limb,
                        const sonde_limb_station station[SONDE_LIMB_STATIONS], sonde_model *model) {
@@ -250,7 +257,7 @@ static void name_parts(const sonde_limb *limb,
                              .normal = model->sites[k].normal,
                              .vein_m = sonde_limb_to_model(limb, station[k].target_m),
                              .site = k};
-    name_of(station[k].name, mark->name);
+    snprintf(mark->name, sizeof mark->name, "%s", LANDMARKS[k]);
   }
   uint32_t common = sonde_limb_vessel_find(limb, "common femoral vein"),
            popliteal = sonde_limb_vessel_find(limb, "popliteal vein");
@@ -266,8 +273,7 @@ static void name_parts(const sonde_limb *limb,
   const struct {
     const char *name;
     double from, to;
-  } segment[] = {{"external_iliac", vein->point[0].centre_m.z, ligament},
-                 {"common_femoral", ligament, meet},
+  } segment[] = {{"common_femoral", ligament, meet},
                  {"femoral_proximal", meet, meet + third},
                  {"femoral_mid", meet + third, meet + 2 * third},
                  {"femoral_distal", meet + 2 * third, hiatus},
