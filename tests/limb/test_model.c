@@ -1,0 +1,224 @@
+// The model of a limb: surfaces, layers and springs from the tissue below, the limb as tissue map,
+// vessels and landmarks, its file.
+#include "limb_test.h"
+
+#include "sonde/limb_model.h"
+
+#include <string.h>
+
+enum { MODELS = 3 };
+static sonde_model *model[MODELS];
+static sonde_limb_body body[MODELS];
+
+static sonde_model *make(const sonde_limb_body *of) {
+  sonde_model *made = NULL;
+  sonde_error error = {0};
+  const sonde_limb_model_def def = sonde_limb_model_def_default();
+  if (sonde_limb_model(of, &def, &made, &error)) fail_msg("%s", error.message);
+  return made;
+}
+
+static int make_models(void **state) {
+  (void)state;
+  const double bmi[MODELS] = {20, 27, 35};
+  for (uint32_t k = 0; k < MODELS; ++k) {
+    body[k] = sonde_limb_unknown();
+    body[k].bmi = bmi[k];
+    body[k].side = k == 1 ? SONDE_LIMB_LEFT : SONDE_LIMB_RIGHT;
+    assert_int_equal(sonde_limb_draw(&body[k], 40 + k, &body[k], NULL), SONDE_OK);
+    model[k] = make(&body[k]);
+  }
+  return 0;
+}
+static int destroy_models(void **state) {
+  (void)state;
+  for (uint32_t k = 0; k < MODELS; ++k) sonde_model_destroy(model[k]);
+  return 0;
+}
+
+static void surfaces_are_closed_and_the_map_lies_on_them(void **state) {
+  (void)state;
+  for (uint32_t k = 0; k < MODELS; ++k) {
+    const sonde_model *m = model[k];
+    const sonde_tissue_map *map = m->map;
+    sonde_mesh_report report;
+    assert_int_equal(sonde_mesh_inspect(&m->femur, &report, NULL), SONDE_OK);
+    assert_true(report.closed && report.outward);
+    double worst = 0, bone = 0, length = 0;
+    uint32_t looked = 0, off = 0, surface = 0, apart = 0;
+    for (uint32_t i = 0; i < m->surface.vertex_count; ++i)
+      length = fmax(length, m->surface.vertices[i].z);
+    for (uint32_t i = 0; i < m->surface.vertex_count; i += 7) {
+      sonde_vec3 p = m->surface.vertices[i];
+      sonde_tissue_depths d;
+      if (p.z < 0.005 || p.z > length - 0.005) continue; // the cut ends
+      map->depths(map->self, p, &d);
+      worst = fmax(worst, fabs(d.skin_m));
+      ++looked, off += fabs(d.skin_m) > 0.4e-3; // the sag of a face of 6 mm
+      assert_true(d.skin_m < d.superficial_m && d.superficial_m < d.fascia_m);
+    }
+    for (uint32_t i = 0; i < m->femur.vertex_count; i += 7) {
+      sonde_tissue_depths d;
+      map->depths(map->self, m->femur.vertices[i], &d);
+      bone = fmax(bone, fabs(d.bone_m));
+      ++surface, apart += fabs(d.bone_m) > 0.5e-3;
+    }
+    print_message("limb %u: skin %.2f mm off its map, %u of %u more than 0.4 mm; bones %.2f mm\n",
+                  k, 1e3 * worst, off, looked, 1e3 * bone);
+    assert_true(off <= looked / 100 && worst < 4e-3);  // where the ramus lifts the skin
+    assert_true(apart <= surface / 50 && bone < 3e-3); // where two bones touch
+  }
+}
+
+// A point belongs to the cell of the least power, which is the muscle that the limb's label names.
+static void powers_are_those_of_the_labels(void **state) {
+  (void)state;
+  uint32_t random = 3;
+  for (uint32_t k = 0; k < MODELS; ++k) {
+    const sonde_tissue_map *map = model[k]->map;
+    const sonde_limb *limb = sonde_limb_of(model[k]);
+    uint32_t muscles = 0;
+    for (int n = 0; n < 4000; ++n) {
+      double level = -0.1 + 2 * next_uniform(&random), angle = 2 * SONDE_PI * next_uniform(&random);
+      sonde_vec3 p = sonde_limb_point(limb, level, angle, next_uniform(&random));
+      sonde_limb_label label = sonde_limb_at(limb, p);
+      sonde_vec3 rest = sonde_limb_to_model(limb, p);
+      if (label.tissue != SONDE_LIMB_MUSCLE) continue;
+      uint32_t seed[SONDE_MAP_SEEDS], best = 0;
+      uint32_t count = map->seeds(map->self, rest, 0.02, SONDE_MAP_SEEDS, seed);
+      double power[SONDE_MAP_SEEDS];
+      sonde_vec3 at[SONDE_MAP_SEEDS];
+      map->powers(map->self, rest, count, seed, power, at);
+      for (uint32_t i = 1; i < count; ++i)
+        if (power[i] < power[best]) best = i;
+      sonde_map_seed facts = map->seed(map->self, seed[best], rest);
+      assert_true(facts.muscle && facts.cell == label.index);
+      assert_int_equal(map->tissue(map->self, rest), SONDE_TISSUE_MUSCLE);
+      assert_near(v_norm(facts.fibre), 1, 1e-9);
+      assert_true(facts.fibre.z > 0); // fibres run down, as the model's z
+      ++muscles;
+    }
+    assert_true(muscles > 1000);
+  }
+}
+
+static double stiffness_at(const sonde_model *m, const char *landmark) {
+  const sonde_landmark *mark = sonde_anatomy_landmark(m->anatomy, landmark);
+  if (!mark) fail_msg("no landmark %s", landmark);
+  return m->sites[mark->site].k0_n_m3;
+}
+
+static void springs_follow_the_tissue_below(void **state) {
+  (void)state;
+  for (uint32_t k = 0; k < MODELS; ++k) {
+    const sonde_model *m = model[k];
+    const sonde_limb *limb = sonde_limb_of(m);
+    // Over the shin there is no muscle, over mid-thigh there is most of it.
+    sonde_vec3 shin = sonde_limb_point(limb, 1.4, 35 * DEGREE, 1.05);
+    uint32_t over =
+        v_nearest(m->surface.vertices, m->surface.vertex_count, sonde_limb_to_model(limb, shin));
+    assert_true(m->bone_depth_m[over] < 0.02);
+    assert_true(m->k0_n_m3[over] > 2 * stiffness_at(m, "femoral_mid"));
+    assert_true(m->xm_m[over] < 0.5 * m->sites[5].xm_m);
+    for (uint32_t i = 0; i < m->surface.vertex_count; ++i)
+      assert_true(m->fat_depth_m[i] <= m->muscle_depth_m[i] &&
+                  m->muscle_depth_m[i] < m->bone_depth_m[i]);
+  }
+}
+
+static void vessels_run_down_under_their_landmarks(void **state) {
+  (void)state;
+  for (uint32_t k = 0; k < MODELS; ++k) {
+    const sonde_model *m = model[k];
+    const sonde_limb *limb = sonde_limb_of(m);
+    for (uint32_t i = 1; i < m->vein.count; ++i)
+      assert_true(m->vein.point[i].centre_m.z > m->vein.point[i - 1].centre_m.z);
+    assert_int_equal(m->anatomy->landmark_count, SONDE_LIMB_STATIONS);
+    assert_int_equal(m->anatomy->branch_count + 8, sonde_limb_vessel_count(limb)); // two chains
+    for (uint32_t i = 0; i < m->anatomy->segment_count; ++i)
+      assert_true(m->anatomy->segment[i].to_m > m->anatomy->segment[i].from_m);
+    // The vein of the model passes through the places of the graph.
+    uint32_t femoral = sonde_limb_vessel_find(limb, "femoral vein");
+    double length = sonde_limb_vessel_get(limb, femoral).length_m;
+    for (int n = 1; n < 9; ++n) {
+      sonde_vec3 p = sonde_limb_to_model(
+          limb, sonde_limb_vessel_place(limb, femoral, n * length / 9).centre_m);
+      double near = INFINITY;
+      for (uint32_t i = 1; i < m->vein.count; ++i) {
+        sonde_vec3 a = m->vein.point[i - 1].centre_m, d = v_sub(m->vein.point[i].centre_m, a);
+        double t = clamp(v_dot(v_sub(p, a), d) / v_norm2(d), 0, 1);
+        near = fmin(near, v_distance(p, v_madd(a, t, d)));
+      }
+      assert_true(near < 0.5e-3);
+    }
+  }
+}
+
+// A left limb is the mirror of the right one of the same body.
+static void a_left_model_is_the_mirror(void **state) {
+  (void)state;
+  sonde_limb_body left = body[0];
+  left.side = SONDE_LIMB_LEFT;
+  sonde_model *m = make(&left);
+  assert_int_equal(m->vein.count, model[0]->vein.count);
+  for (uint32_t i = 0; i < m->vein.count; ++i) {
+    sonde_vec3 a = m->vein.point[i].centre_m, b = model[0]->vein.point[i].centre_m;
+    assert_near(a.x, -b.x, 1e-8);
+    assert_near(a.y, b.y, 1e-8);
+    assert_near(a.z, b.z, 1e-8);
+  }
+  sonde_mesh_report report;
+  assert_int_equal(sonde_mesh_inspect(&m->surface, &report, NULL), SONDE_OK);
+  assert_true(report.closed && report.outward);
+  sonde_model_destroy(m);
+}
+
+static void a_file_brings_the_same_limb_back(void **state) {
+  (void)state;
+  static const char path[] = "test_limb_model.sonde";
+
+  assert_int_equal(sonde_model_save(model[1], path, NULL), SONDE_OK);
+  sonde_model *read = NULL;
+  sonde_error error = {0};
+  if (sonde_limb_model_load(path, &read, &error)) fail_msg("%s", error.message);
+  assert_non_null(sonde_limb_of(read));
+  assert_int_equal(read->surface.vertex_count, model[1]->surface.vertex_count);
+  assert_memory_equal(read->k0_n_m3, model[1]->k0_n_m3,
+                      read->surface.vertex_count * sizeof *read->k0_n_m3);
+  uint32_t random = 5;
+  for (int n = 0; n < 500; ++n) {
+    const sonde_tissue_map *a = read->map, *b = model[1]->map;
+    sonde_vec3 p = vec3(0.1 * next_uniform(&random) - 0.05, 0.1 * next_uniform(&random) - 0.05,
+                        0.8 * next_uniform(&random));
+    assert_int_equal(a->tissue(a->self, p), b->tissue(b->self, p));
+  }
+  // The library without limbs reads the same file, and has no map.
+  sonde_model *plain = NULL;
+  assert_int_equal(sonde_model_load(path, &plain, NULL), SONDE_OK);
+  assert_null(plain->map);
+  sonde_model_destroy(plain);
+  // Another body's numbers do not belong to this file's vein.
+  read->map_origin[8] += 0.02;
+  assert_int_equal(sonde_model_save(read, path, NULL), SONDE_OK);
+  sonde_model *wrong = NULL;
+  assert_int_equal(sonde_limb_model_load(path, &wrong, &error), SONDE_VERSION);
+  assert_null(wrong);
+  assert_non_null(strstr(error.message, "make it again"));
+  read->map_origin[0] = 99;
+  assert_int_equal(sonde_model_save(read, path, NULL), SONDE_OK);
+  assert_int_equal(sonde_limb_model_load(path, &wrong, &error), SONDE_VERSION);
+  sonde_model_destroy(read);
+  remove(path);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(surfaces_are_closed_and_the_map_lies_on_them),
+      cmocka_unit_test(powers_are_those_of_the_labels),
+      cmocka_unit_test(springs_follow_the_tissue_below),
+      cmocka_unit_test(vessels_run_down_under_their_landmarks),
+      cmocka_unit_test(a_left_model_is_the_mirror),
+      cmocka_unit_test(a_file_brings_the_same_limb_back),
+  };
+  return cmocka_run_group_tests(tests, make_models, destroy_models);
+}
