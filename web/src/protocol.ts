@@ -276,7 +276,7 @@ export interface Frame {
   pixels: Uint8Array;
 }
 
-export const PART = { skin: 0, femur: 1, vein: 2, artery: 3, probe: 16 } as const;
+export const PART = { skin: 0, femur: 1, vein: 2, artery: 3, probe: 16, branch: 256 } as const;
 /** versions of the protocol that this page speaks; 1 has no trainer */
 export const VERSIONS = [1, 2, 3];
 

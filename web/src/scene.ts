@@ -19,6 +19,7 @@ const WIDE = 1.3; // width over height in which the whole leg is seen
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
 const MOVED_ALPHA = 0.86;
 const CREASE_RAD = 0.6; // sharper edges are drawn sharp
+const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.85; // of the leg's length: what the camera looks at, and from how far
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
 /** Skin: vertex colours with alpha; more opaque where it is seen at a grazing angle, like glass; where
@@ -105,6 +106,8 @@ export class ThighScene {
   private readonly vessels = new Map<number, FlatVessel>();
   private sites: readonly Site[] = [];
   private frame: Frame | null = null;
+  private middle_mm = 142;
+  private away_mm = 560;
   /** whether the thigh is drawn without WebGL from now on */
   flatChanged: (flat: boolean) => void = () => undefined;
 
@@ -159,11 +162,21 @@ export class ThighScene {
     this.orbit.addEventListener("change", () => (this.dirty = true));
   }
 
+  /** The middle and the length of what is to be seen; a patient of another length is looked at anew. */
+  private look(mesh: Mesh): void {
+    let low = Infinity, high = -Infinity;
+    for (let i = 2; i < mesh.points.length; i += 3) (low = Math.min(low, mesh.points[i]!)), (high = Math.max(high, mesh.points[i]!));
+    const middle = low + MIDDLE_SHARE * (high - low), away = Math.min(1400, AWAY_SHARE * (high - low));
+    const other = Math.abs(away - this.away_mm) > 0.3 * this.away_mm;
+    (this.middle_mm = middle), (this.away_mm = away);
+    if (other) this.home();
+  }
+
   /** Medial and anterior, the leg lying across the picture, the knee to the left. */
   home(): void {
-    this.orbit.target.set(12, -8, 142);
+    this.orbit.target.set(12, -8, this.middle_mm);
     const away = new THREE.Vector3(0.74, 0.52, -0.43).normalize();
-    this.camera.position.copy(this.orbit.target).addScaledVector(away, 560);
+    this.camera.position.copy(this.orbit.target).addScaledVector(away, this.away_mm);
     this.orbit.update();
     this.dirty = true;
   }
@@ -224,8 +237,10 @@ export class ThighScene {
   private setSkin(mesh: Mesh): void {
     this.skin = new Skin(mesh.points.slice(), mesh.faces);
     this.restMesh = new THREE.Mesh(ThighScene.geometry(mesh));
+    for (const part of this.vessels.keys()) this.inside.getObjectByName(`vessel ${part}`)?.removeFromParent();
     this.vessels.clear();
     this.frame = null;
+    this.look(mesh);
     const g = ThighScene.geometry(mesh);
     const colours = new Float32Array((mesh.points.length / 3) * 4).fill(CALM_ALPHA);
     for (let i = 0; i < colours.length; i += 4) colours.set(SHADE_TABLE.subarray(0, 3), i);
@@ -265,11 +280,13 @@ export class ThighScene {
       radius += line.points[i + 3]!;
     }
     if (points.length < 2) return;
-    this.vessels.set(line.part, { points: line.points.slice(), vein: line.part === PART.vein });
-    const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), 96, radius / points.length, 16);
-    const colour = line.part === PART.vein ? COLOUR.vein : COLOUR.artery;
+    const vein = line.part === PART.vein || (line.part >= PART.branch && line.part % 2 === 0);
+    const branch = line.part >= PART.branch;
+    this.vessels.set(line.part, { points: line.points.slice(), vein });
+    const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), branch ? 40 : 96, radius / points.length, branch ? 8 : 16);
+    const colour = vein ? COLOUR.vein : COLOUR.artery;
     const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.55, emissive: colour, emissiveIntensity: 0.25 });
-    this.replaceInside(line.part === PART.vein ? "vein" : "artery", new THREE.Mesh(tube, material));
+    this.replaceInside(`vessel ${line.part}`, new THREE.Mesh(tube, material));
   }
 
   private setProbeBody(mesh: Mesh): void {

@@ -25,7 +25,8 @@ typedef enum page_part {
   PAGE_FEMUR = 1,
   PAGE_VEIN = 2,
   PAGE_ARTERY = 3,
-  PAGE_PROBE = 16 // plus the probe's index
+  PAGE_PROBE = 16,  // plus the probe's index
+  PAGE_BRANCH = 256 // plus twice the branch's index, and 1 of an artery
 } page_part;
 
 // Length of one unit of a displacement in a frame; 16 bits reach +-65 mm.
