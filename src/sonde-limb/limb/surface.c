@@ -276,6 +276,31 @@ static void fill_hollows(double level, double *radius) {
   for (uint32_t c = 0; c < LIMB_ANGLES; ++c) radius[c] += share * (hull[c] - radius[c]);
 }
 
+// The fascia of a row: what the bones add and what the size loses by them, spread over neighbouring
+// rows, and outside every bone.
+static void spread_push(const limb_surface *s, double (*pushed)[LIMB_ANGLES],
+                        double (*bone)[LIMB_ANGLES], uint32_t r, double fascia[LIMB_ANGLES]) {
+  enum { SPREAD = 6 };
+  const double level = LIMB_TOP + r * LIMB_STEP;
+  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+    double sum = 0, weights = 0;
+    for (int k = -SPREAD; k <= SPREAD; ++k) {
+      int row = (int)r + k;
+      if (row < 0 || row >= LIMB_ROWS) continue;
+      double w = SPREAD + 1 - abs(k);
+      sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
+    }
+    // Also what reaches the rows and, at pelvis and patella, the angles beside.
+    double reach = 0;
+    int aside = level < 0.15 || fabs(level - 0.95) < 0.1 ? 1 : 0;
+    for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
+      for (int q = -aside; q <= aside; ++q)
+        reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
+    fascia[c] = fmax(s->fascia[r][c] + sum / weights, reach);
+  }
+  fill_hollows(level, fascia);
+}
+
 sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
   SONDE_ASSERT(limb->bones);
   const sonde_limb_body *b = &limb->body;
@@ -332,27 +357,7 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
       }
       fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
     }
-    for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
-      enum { SPREAD = 6 };
-      for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-        double sum = 0, weights = 0;
-        for (int k = -SPREAD; k <= SPREAD; ++k) {
-          int row = (int)r + k;
-          if (row < 0 || row >= LIMB_ROWS) continue;
-          double w = SPREAD + 1 - abs(k);
-          sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
-        }
-        // Also what reaches the rows and, at pelvis and patella, the angles beside.
-        double reach = 0;
-        double level = LIMB_TOP + r * LIMB_STEP;
-        int aside = level < 0.15 || fabs(level - 0.95) < 0.1 ? 1 : 0;
-        for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
-          for (int q = -aside; q <= aside; ++q)
-            reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
-        fascia[r][c] = fmax(s->fascia[r][c] + sum / weights, reach);
-      }
-      fill_hollows(LIMB_TOP + r * LIMB_STEP, fascia[r]);
-    }
+    for (uint32_t r = 0; r < LIMB_ROWS; ++r) spread_push(s, pushed, bone, r, fascia[r]);
     // At the groin the section moves by what the push has taken from its front.
     for (size_t k = 0; k < SONDE_COUNT_OF(CENTRES) && pass == 0 && CENTRES[k][0] <= 0; ++k) {
       uint32_t row = (uint32_t)lround((CENTRES[k][0] - LIMB_TOP) / LIMB_STEP);
