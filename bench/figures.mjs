@@ -165,6 +165,29 @@ const GROUPS = {
       }
     },
   },
+  // Laws of 200 limbs: sums of faults, shares of limbs whose view is true and whose depth is at most 5 mm beyond its band.
+  limb: {
+    sources: ['src/sonde-limb', 'bench/bench_limb.c', 'bench/limb_laws.c'],
+    measure(bin) {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-')), path = join(folder, 'limbs.csv')
+      found(bin, 'bench_limb', path)
+      const [head, ...rows] = readFileSync(path, 'utf8').trim().split('\n').map(line => line.split(','))
+      rmSync(folder, { recursive: true })
+      const column = name => rows.map(row => Number(row[head.indexOf(name)]))
+      const sum = all => all.reduce((a, b) => a + b, 0), mean = all => sum(all) / all.length
+      const values = { limbs: rows.length, places: sum(column('places')) }
+      for (const name of ['walls', 'bone', 'lumen', 'fascia', 'eye']) values[name] = sum(column(name))
+      for (let k = 1; k <= 11; ++k)
+        values[`v${k}`] = { true_percent: 100 * mean(column(`v${k}`)), in_band_percent: 100 * mean(column(`v${k}_off_mm`).map(off => Number(off <= 5))) }
+      const error = column('vein_error_mm')
+      Object.assign(values, { vein_mean_mm: mean(error), vein_rms_mm: Math.sqrt(mean(error.map(e => e * e))) })
+      for (const part of ['thigh', 'calf']) {
+        const ratio = column(`${part}_ratio`), middle = mean(ratio)
+        values[part] = { ratio: middle, deviation: Math.sqrt(mean(ratio.map(r => (r - middle) ** 2))) }
+      }
+      return values
+    },
+  },
   hostile: {
     sources: ['src/sonde/interior', 'src/sonde/world'],
     measure(bin) {
@@ -223,6 +246,11 @@ const BLOCKS = {
       ...['linear', 'point', 'both', 'left_out', 'third'].map(key => r[`${key}_percent`] === null ? '' : `${fixed(r[`${key}_percent`], 1)} %`),
       `${fixed(r.none_percent, 0)} %`, r.nodes, r.setup_ms === null ? '' : `${fixed(r.setup_ms, 0)} ms`, r.step_ms === null ? '' : `${fixed(r.step_ms, 2)} ms`])),
   paper_figures: ({ paper }) => table(['figure', 'what it shows'], Object.values(paper.figures).map(f => [f.title.replace(/\..*/, ''), f.caption])),
+  limb_faults: ({ limb }) => table(['law', `violations in ${limb.limbs} limbs, ${fixed(limb.places, 0)} places`],
+    [['walls of two vessels 0.3 mm apart or more', limb.walls], ['deep vessels 1.5 mm or more from bone', limb.bone], ['no lumen in bone', limb.lumen],
+      ['deep vessels 0.3 mm or more under the deep fascia', limb.fascia], ['saphenous veins between both fasciae', limb.eye]]),
+  limb_views: ({ limb }) => table(['view', 'true, % of limbs', 'depth at most 5 mm beyond its band, %'],
+    Array.from({ length: 11 }, (_, k) => [`V${k + 1}`, fixed(limb[`v${k + 1}`].true_percent, 1), fixed(limb[`v${k + 1}`].in_band_percent, 1)])),
   solver: ({ solver }) => fenced(solver.output),
   accuracy: ({ accuracy }) => fenced(accuracy.output),
 }

@@ -2,19 +2,29 @@
 // of the body; the order of tissues; a left limb is the mirror of a right one.
 #include "limb_test.h"
 
-#include "limb/frame.h"
+#include "limb/bones.h"
 
-enum { FAMILY = 60 };
-static sonde_limb *family[FAMILY]; // right limbs, made once
+enum { FAMILY = 60, WHOLE = 12 };
+static sonde_limb *family[FAMILY]; // right limbs, bones and surfaces alone
+static sonde_limb *whole[WHOLE];   // the first of them with vessels and muscles
 
 static int make_family(void **state) {
   (void)state;
-  for (uint32_t k = 0; k < FAMILY; ++k) family[k] = limb_of_family(k, SONDE_LIMB_RIGHT);
+  for (uint32_t k = 0; k < FAMILY; ++k) {
+    sonde_limb *limb = family[k] = SONDE_NEW(sonde_limb, 1);
+    sonde_error error = {0};
+    limb->body = body_of_family(k, SONDE_LIMB_RIGHT);
+    limb->scale = limb->body.thigh_length_m / 0.430;
+    if (limb_bones_make(limb, &error) || limb_surface_make(limb, &error))
+      fail_msg("member %u: %s", k, error.message);
+    if (k < WHOLE) whole[k] = limb_of_family(k, SONDE_LIMB_RIGHT);
+  }
   return 0;
 }
 static int destroy_family(void **state) {
   (void)state;
   for (uint32_t k = 0; k < FAMILY; ++k) sonde_limb_destroy(family[k]);
+  for (uint32_t k = 0; k < WHOLE; ++k) sonde_limb_destroy(whole[k]);
   return 0;
 }
 
@@ -109,9 +119,9 @@ static void girths_are_the_body_s_and_centres_are_centroids(void **state) {
 static void tissues_come_in_order(void **state) {
   (void)state;
   uint32_t random = 7;
-  for (uint32_t k = 0; k < FAMILY; ++k) {
-    sonde_limb *limb = family[k];
-    for (int ray = 0; ray < 170; ++ray) {
+  for (uint32_t k = 0; k < WHOLE; ++k) {
+    sonde_limb *limb = whole[k];
+    for (int ray = 0; ray < 850; ++ray) {
       double level = -0.2 + 2.2 * next_uniform(&random),
              angle = 2 * SONDE_PI * next_uniform(&random);
       double outer = limb_skin_radius(limb, level, angle) / limb_fascia_radius(limb, level, angle);
@@ -136,7 +146,7 @@ static void left_is_the_mirror_of_right(void **state) {
   (void)state;
   uint32_t random = 3;
   for (uint32_t k = 0; k < 6; ++k) {
-    sonde_limb *right = family[k], *left = limb_of_family(k, SONDE_LIMB_LEFT);
+    sonde_limb *right = whole[k], *left = limb_of_family(k, SONDE_LIMB_LEFT);
     for (int i = 0; i < 4000; ++i) {
       sonde_vec3 p =
           sonde_limb_point(right, -0.2 + 2.2 * next_uniform(&random),

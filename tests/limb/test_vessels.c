@@ -158,7 +158,19 @@ static void calibres_have_the_tables_mean_and_deviation(void **state) {
 // Chi square of counts against shares; the bounds are those of p = 0.01.
 static void variants_have_their_frequencies(void **state) {
   (void)state;
-  enum { GREAT, SMALL, ARTERY, FEMORAL, POPLITEAL, LINK, TIBIAL, KINDS, CLASSES = 5 };
+  enum {
+    GREAT,
+    SMALL,
+    ARTERY,
+    FEMORAL,
+    POPLITEAL,
+    LINK,
+    TIBIAL,
+    PERONEAL,
+    SURAL,
+    KINDS,
+    CLASSES = 5
+  };
   const struct {
     const char *name;
     double share[CLASSES];
@@ -169,7 +181,9 @@ static void variants_have_their_frequencies(void **state) {
                   {"double femoral", {75, 11.6, 12.3, 1.1}, 4},
                   {"double popliteal", {58, 37, 5}, 3},
                   {"deep femoral link", {92, 8}, 2},
-                  {"single tibial", {90, 10}, 2}};
+                  {"single tibial", {90, 10}, 2},
+                  {"single peroneal", {90, 10}, 2},
+                  {"common sural trunk", {85, 15}, 2}};
   static const double bound[CLASSES] = {0, 6.63, 9.21, 11.34, 13.28};
   uint32_t count[KINDS][CLASSES] = {{0}};
   for (uint32_t k = 0; k < POPULATION; ++k) {
@@ -180,7 +194,7 @@ static void variants_have_their_frequencies(void **state) {
     const sonde_limb_variants v = limb_vessel_draws(&limb).variants;
     const uint32_t drawn[KINDS] = {v.great_saphenous, v.small_saphenous,  v.popliteal_artery,
                                    v.second_femoral,  v.second_popliteal, v.deep_popliteal_link,
-                                   v.single_tibial};
+                                   v.single_tibial,   v.single_peroneal,  v.common_sural_trunk};
     for (uint32_t i = 0; i < KINDS; ++i) ++count[i][drawn[i]];
   }
   for (uint32_t i = 0; i < KINDS; ++i) {

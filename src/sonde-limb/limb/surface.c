@@ -292,7 +292,7 @@ static void spread_push(const limb_surface *s, double (*pushed)[LIMB_ANGLES],
     }
     // Also what reaches the rows and, at pelvis and patella, the angles beside.
     double reach = 0;
-    int aside = level < 0.15 || fabs(level - 0.95) < 0.1 ? 1 : 0;
+    int aside = level < 0.15 || fabs(level - 0.95) < 0.1 || level > 1.9 ? 1 : 0;
     for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
       for (int q = -aside; q <= aside; ++q)
         reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
