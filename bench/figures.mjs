@@ -98,7 +98,7 @@ const GROUPS = {
   },
   paper: {
     sources: ['src/sonde-fit', 'src/sonde-scene', 'src/sonde-sweep', 'src/sonde/geometry', 'src/sonde/echo', 'src/sonde/interior', ...engine,
-      ...['bulk', 'collision', 'curves', 'fit', 'models', 'pressed', 'solvers', 'speed', 'steps', 'sweep'].map(name => `app/paper_${name}.c`), 'data/thigh'],
+      ...['bulk', 'collision', 'curves', 'equal', 'fit', 'models', 'pressed', 'solvers', 'speed', 'steps', 'sweep'].map(name => `app/paper_${name}.c`), 'data/thigh'],
     measure(bin) {
       const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-'))
       const started = Date.now(), values = json(bin, 'paper', '-o', folder)
@@ -241,10 +241,15 @@ const BLOCKS = {
   paper_models: ({ paper }) => table(['model', 'parameters', 'MAE / SD', 'linear', 'point', 'both', 'third footprint', 'sites left out', 'step'],
     Object.values(paper.tables.models.rows).map(r => [r.name, r.parameters, `${fixed(r.mae_n, 2)} / ${fixed(r.sd_n, 2)} N`,
       ...['linear', 'point', 'both', 'third', 'left_out'].map(key => `${fixed(r[`${key}_percent`], 2)} %`), `${fixed(r.step_ms, 2)} ms`])),
-  paper_volumetric: ({ paper }) => table(['model', 'parameters', 'linear', 'point', 'both', 'sites left out', 'third footprint', 'rows without equilibrium', 'nodes', 'set-up', 'step'],
+  paper_volumetric: ({ paper }) => table(['model', 'parameters', 'linear', 'point', 'both', 'sites left out', 'third footprint', 'rows without equilibrium', ...(paper.tables.volumetric.columns.all_percent ? ['both, these as no force'] : []), 'nodes', 'set-up', 'step'],
     Object.values(paper.tables.volumetric.rows).map(r => [r.name, r.parameters,
       ...['linear', 'point', 'both', 'left_out', 'third'].map(key => r[`${key}_percent`] === null ? '' : `${fixed(r[`${key}_percent`], 1)} %`),
-      `${fixed(r.none_percent, 0)} %`, r.nodes, r.setup_ms === null ? '' : `${fixed(r.setup_ms, 0)} ms`, r.step_ms === null ? '' : `${fixed(r.step_ms, 2)} ms`])),
+      `${fixed(r.none_percent, 0)} %`, ...(paper.tables.volumetric.columns.all_percent ? [`${fixed(r.all_percent, 1)} %`] : []), r.nodes, r.setup_ms === null ? '' : `${fixed(r.setup_ms, 0)} ms`, r.step_ms === null ? '' : `${fixed(r.step_ms, 2)} ms`])),
+  paper_equal: ({ paper }) => !paper.tables.equal_error ? 'Its figures are those of the next measurement, `node bench/figures.mjs measure build/release/bin paper`.'
+    : table(['model', 'error at 16 mm', 'error at 8 mm', 'nodes', 'set-up', 'step', 'of two layers\'', 'step at 8 mm'],
+      Object.values(paper.tables.equal_error.rows).map(r => [r.name, ...['coarse', 'middle'].map(key => `${fixed(r[`${key}_percent`], 1)} %`),
+        ...(r.equal_step_ms === null ? ['', '', 'not reached', ''] : [fixed(r.equal_nodes, 0), `${fixed(r.equal_setup_ms, 0)} ms`, `${fixed(r.equal_step_ms, 3)} ms`, fixed(r.times, 1)]),
+        `${fixed(r.same_step_ms, 3)} ms`])),
   paper_figures: ({ paper }) => table(['figure', 'what it shows'], Object.values(paper.figures).map(f => [f.title.replace(/\..*/, ''), f.caption])),
   limb_faults: ({ limb }) => table(['law', `violations in ${limb.limbs} limbs, ${fixed(limb.places, 0)} places`],
     [['walls of two vessels 0.3 mm apart or more', limb.walls], ['deep vessels 1.5 mm or more from bone', limb.bone], ['no lumen in bone', limb.lumen],
