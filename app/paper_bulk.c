@@ -70,13 +70,6 @@ static double percent_at(const sonde_measurements *m, const double *model_n, con
              : paper_percent(&report, probe);
 }
 
-// The same with no force where a model has no equilibrium: what it cannot do counts against it.
-static double percent_of_all(const sonde_measurements *m, double *model_n) {
-  for (uint32_t i = 0; i < m->count; ++i)
-    if (!isfinite(model_n[i])) model_n[i] = 0;
-  return percent_at(m, model_n, NULL);
-}
-
 // Processor time of a state's creation and of a step of 1 ms while the flat probe goes in, ms.
 sonde_status paper_time_steps(const paper *p, const sonde_model *model, double *setup_ms,
                               double *step_ms, sonde_error *error) {
@@ -142,6 +135,12 @@ static sonde_status measure_kind(const paper *p, sonde_model_kind kind, const ch
       bool sought = i < j->sought.m.count;
       none += isfinite(sought ? n[0][i] : n[1][i - j->sought.m.count]) ? 0 : 100.0 / judged_rows;
     }
+    // Of all rows: no force where a model has no equilibrium, which counts against it.
+    double *all = calloc(j->sought.m.count, sizeof *all);
+    for (uint32_t i = 0; all && i < j->sought.m.count; ++i)
+      all[i] = isfinite(n[0][i]) ? n[0][i] : 0;
+    const double of_all = all ? percent_at(&j->sought.m, all, NULL) : NAN;
+    free(all);
     const double cells[] = {r.parameter_count,
                             percent_at(&j->sought.m, n[0], "linear"),
                             percent_at(&j->sought.m, n[0], "point"),
@@ -149,7 +148,7 @@ static sonde_status measure_kind(const paper *p, sonde_model_kind kind, const ch
                             percent_at(&j->left_out.m, n[1], NULL),
                             percent_at(&j->third.m, n[2], NULL),
                             none,
-                            percent_of_all(&j->sought.m, n[0]),
+                            of_all,
                             r.fit_s,
                             r.node_count,
                             setup_ms,

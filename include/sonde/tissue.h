@@ -16,13 +16,11 @@
 extern "C" {
 #endif
 
-/** Deformable models: the two-layer tissue (docs/tissue.md) and volumetric ones (docs/bulk.md).
- */
+/** Deformable models: docs/tissue.md, volumetric ones docs/bulk.md. */
 typedef enum sonde_model_kind {
   SONDE_TWO_LAYER,         /**< the paper's: masses and springs of the skin alone */
   SONDE_LATTICE,           /**< linear springs through the volume (Laffont 1997) */
-  SONDE_THREE_LAYER,       /**< biphasic springs and a volume force in skin, fat and muscle (Lee,
-                                Terzopoulos and Waters 1995) */
+  SONDE_THREE_LAYER,       /**< biphasic springs, volume force (Lee, Terzopoulos, Waters 1995) */
   SONDE_LINEAR_SOLID,      /**< linear elastic tetrahedra */
   SONDE_NEO_HOOKEAN_SOLID, /**< neo-Hookean tetrahedra */
   SONDE_CONDENSED_SOLID,   /**< the same as linear ones, condensed to the skin by K* */
@@ -80,7 +78,7 @@ typedef struct sonde_surface_law {
   double guard;                     /**< theta: straight continuation of p(s) beyond theta*xm */
 } sonde_surface_law;
 
-/** A thigh's in-plane (N/m) and tangential (N/m^3) stiffness; how chosen: docs/fit.md. */
+/** A thigh's in-plane (N/m) and tangential (N/m^3) stiffness (docs/fit.md). */
 #define SONDE_SKIN_INPLANE_N_M 35.0
 #define SONDE_SKIN_TANGENTIAL_N_M3 1e5
 
@@ -131,10 +129,9 @@ typedef struct sonde_model {
   sonde_model_kind kind;
   sonde_mesh surface; /**< skin at rest, refined */
   sonde_topology topology;
-  sonde_mesh femur; /**< closed; of a limb all its bones */
-  /** Middles of the bone that a limb turns about, end to end; NULL: straight along the femur. */
-  sonde_vec3 *bone_axis_m;
-  uint32_t bone_axis_count;
+  sonde_mesh femur;        /**< closed; of a limb all its bones */
+  sonde_vec3 *bone_axis_m; /**< NULL, or [bone_axis_count] middles of the bones of a limb */
+  uint32_t bone_axis_count, map_origin_count;
   sonde_surface_law law;
   sonde_vec3 *normal;               /**< [nodes] outward rest normals */
   double *area_m2;                  /**< [nodes] */
@@ -159,12 +156,8 @@ typedef struct sonde_model {
   sonde_vessel vein, artery; /**< femoral vessels */
   /** NULL, or named anatomy (sonde/tissue_anatomy.h); released with the model by sonde_free. */
   struct sonde_thigh_anatomy *anatomy;
-  /** NULL: tissue follows from the layers above; or what knows it at every point
-      (sonde/tissue_anatomy.h); released with the model by map->destroy. */
-  struct sonde_tissue_map *map;
-  double *map_origin; /**< NULL, or [map_origin_count] from which the map is made again: files keep
-                         these numbers, not the map */
-  uint32_t map_origin_count;
+  struct sonde_tissue_map *map; /**< NULL, or what knows the tissue everywhere (tissue_anatomy.h) */
+  double *map_origin;      /**< NULL, or [map_origin_count] numbers: what files keep of the map */
   struct sonde_bulk *bulk; /**< NULL, or of a volumetric model; released with it */
   uint64_t checksum;       /**< of the file's content; 0 before it is saved or loaded */
 } sonde_model;

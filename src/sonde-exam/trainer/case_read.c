@@ -66,27 +66,23 @@ static void read_parameters(sonde_reader *reader, sonde_place at, const char *wh
   }
 }
 
-// A whole limb from a seed and what is known of the body.
-static void read_leg(sonde_reader *reader, sonde_place at, sonde_case *c) {
-  static const char *const MORE[] = {"seed", "sex", "side", NULL};
-  uint32_t count;
-  const sonde_parameter *parameter = sonde_limb_parameters(&count);
-  read_parameters(reader, at, "leg", MORE, parameter, count, &c->leg);
-  c->thigh = SONDE_CASE_LEG;
-  c->seed = sonde_read_integer(reader, at, "seed", 0, UINT32_MAX, 1);
-  c->leg.sex = (sonde_sex)sonde_read_choice(reader, at, "sex", sonde_case_sexes, 0);
-  c->leg.side = (sonde_limb_side)sonde_read_choice(reader, at, "side", sonde_case_sides, 0);
-}
-
-// The bundled thigh, a model file, or one that is generated from a seed and what is known of it.
+// A whole limb; or the bundled thigh, a model file, or one that is generated from a seed and what
+// is known of it.
 static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   static const char *const MODEL[] = {"model", NULL};
   sonde_place at = sonde_read_find(reader, root, "thigh");
   sonde_place leg = sonde_read_find(reader, root, "leg");
-  if (leg && at)
-    sonde_reader_fail(reader, leg, SONDE_FORMAT, "give either leg or thigh");
-  else if (leg)
-    read_leg(reader, leg, c);
+  if (leg && at) sonde_reader_fail(reader, leg, SONDE_FORMAT, "give either leg or thigh");
+  if (leg) {
+    static const char *const BODY[] = {"seed", "sex", "side", NULL};
+    uint32_t count;
+    const sonde_parameter *parameter = sonde_limb_parameters(&count);
+    read_parameters(reader, leg, "leg", BODY, parameter, count, &c->leg);
+    c->thigh = SONDE_CASE_LEG;
+    c->seed = sonde_read_integer(reader, leg, "seed", 0, UINT32_MAX, 1);
+    c->leg.sex = (sonde_sex)sonde_read_choice(reader, leg, "sex", sonde_case_sexes, 0);
+    c->leg.side = (sonde_limb_side)sonde_read_choice(reader, leg, "side", sonde_case_sides, 0);
+  }
   if (!at || leg) return;
   if (sonde_read_is_text(reader, at)) {
     const char *text = sonde_read_text_at(reader, at, "thigh");

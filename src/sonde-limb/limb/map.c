@@ -9,10 +9,6 @@ static sonde_vec3 in_limb(const sonde_limb *limb, sonde_vec3 p) {
   return vec3(limb->body.side == SONDE_LIMB_LEFT ? -p.x : p.x, p.y, limb_z(limb, LIMB_TOP) - p.z);
 }
 
-static sonde_vec3 to_model(const sonde_limb *limb, sonde_vec3 v) {
-  return vec3(limb->body.side == SONDE_LIMB_LEFT ? -v.x : v.x, v.y, -v.z);
-}
-
 static void depths(const void *self, sonde_vec3 rest, sonde_tissue_depths *d) {
   const sonde_limb *limb = self;
   sonde_vec3 p = in_limb(limb, rest);
@@ -110,7 +106,8 @@ static sonde_map_seed seed_facts(const void *self, uint32_t seed, sonde_vec3 res
                           .muscle = cell.cell < SONDE_LIMB_MUSCLES,
                           .fibre = vec3(0, 0, 1)};
   if (!facts.muscle) return facts;
-  facts.fibre = to_model(limb, limb_fibre(limb, &cell, in_limb(limb, rest)));
+  sonde_vec3 fibre = limb_fibre(limb, &cell, in_limb(limb, rest));
+  facts.fibre = vec3(limb->body.side == SONDE_LIMB_LEFT ? -fibre.x : fibre.x, fibre.y, -fibre.z);
   facts.pennation_rad = limb_muscle_table[cell.cell].pennation_deg * SONDE_PI / 180;
   return facts;
 }

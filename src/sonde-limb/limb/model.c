@@ -22,9 +22,6 @@ sonde_vec3 sonde_limb_to_model(const sonde_limb *limb, sonde_vec3 p) {
   return vec3(p.x, p.y, limb_z(limb, LIMB_TOP) - p.z);
 }
 
-// The same for directions.
-static sonde_vec3 turned(sonde_vec3 v) { return vec3(v.x, v.y, -v.z); }
-
 // Appends a mesh in the model's frame: its z runs the other way, so that its faces turn round.
 static sonde_status append(const sonde_limb *limb, const sonde_mesh *from, sonde_mesh *to,
                            sonde_error *error) {
@@ -45,21 +42,6 @@ static sonde_status append(const sonde_limb *limb, const sonde_mesh *from, sonde
   sonde_mesh_clear(to);
   *to = all;
   return SONDE_OK;
-}
-
-// Skin and all bones.
-static sonde_status make_meshes(const sonde_limb *limb, double edge_m, sonde_mesh *skin,
-                                sonde_mesh *bones, sonde_error *error) {
-  sonde_mesh part = {0};
-  sonde_status status = sonde_limb_skin(limb, edge_m, &part, error);
-  if (!status) status = append(limb, &part, skin, error);
-  sonde_mesh_clear(&part);
-  for (int bone = 0; bone < SONDE_LIMB_BONES && !status; ++bone) {
-    status = sonde_limb_bone_mesh(limb, (sonde_limb_bone)bone, BONE_EDGE_M, &part, error);
-    if (!status) status = append(limb, &part, bones, error);
-    sonde_mesh_clear(&part);
-  }
-  return status;
 }
 
 // Middles of the bones that carry the body: hip joint, neck, shaft, knee, tibia.
@@ -162,20 +144,6 @@ static const char *const VEINS[] = {"external iliac vein", "common femoral vein"
 static const char *const ARTERIES[] = {"external iliac artery", "common femoral artery",
                                        "superficial femoral artery", "popliteal artery", NULL};
 
-// A name as files have it: "deep femoral vein" -> "deep_femoral_vein". Saphenous veins go
-// without their last word, as those of a thigh, and so do names that are too long.
-static void name_of(const char *from, char to[32]) {
-  enum { MOST = 31 };
-  char all[64];
-  size_t count = 0;
-  for (; *from && count + 1 < sizeof all; ++from) all[count++] = *from == ' ' ? '_' : *from;
-  all[count] = '\0';
-  char *last = strstr(all, "saphenous_vein");
-  if (last && strlen(last) == strlen("saphenous_vein")) last[strlen("saphenous")] = '\0';
-  while (strlen(all) > MOST && (last = strrchr(all, '_')) != NULL) *last = '\0';
-  snprintf(to, MOST + 1, "%.31s", all);
-}
-
 // Vessels beside the main ones, in the order of the graph while there is room.
 static void lay_branches(const sonde_limb *limb, const chain *veins, const chain *arteries,
                          sonde_thigh_anatomy *a) {
@@ -190,7 +158,16 @@ static void lay_branches(const sonde_limb *limb, const chain *veins, const chain
     sonde_branch *branch = &a->branch[a->branch_count++];
     *branch = (sonde_branch){.kind = vessel.kind == SONDE_LIMB_ARTERY ? SONDE_VESSEL_ARTERY
                                                                       : SONDE_VESSEL_VEIN};
-    name_of(vessel.name, branch->name);
+    // A name as files have it: "deep femoral vein" -> "deep_femoral_vein". Saphenous veins go
+    // without their last word, as those of a thigh, and so do names that are too long.
+    char all[SONDE_LIMB_VESSEL_NAME];
+    snprintf(all, sizeof all, "%s", vessel.name);
+    for (char *letter = all; *letter; ++letter)
+      if (*letter == ' ') *letter = '_';
+    char *last = strstr(all, "saphenous_vein");
+    if (last && strlen(last) == strlen("saphenous_vein")) last[strlen("saphenous")] = '\0';
+    while (strlen(all) >= sizeof branch->name && (last = strrchr(all, '_')) != NULL) *last = '\0';
+    snprintf(branch->name, sizeof branch->name, "%.31s", all);
     lay_line(limb, &c, false, &branch->line);
   }
 }
@@ -198,7 +175,8 @@ static void lay_branches(const sonde_limb *limb, const chain *veins, const chain
 /* ---- stations ----------------------------------------------------------------------------- */
 
 static sonde_site site_at(const sonde_limb *limb, uint32_t id, sonde_vec3 skin, sonde_vec3 normal) {
-  sonde_vec3 n = turned(normal), u = v_unit(v_cross(vec3(0, 0, 1), n), vec3(1, 0, 0));
+  sonde_vec3 n = vec3(normal.x, normal.y, -normal.z),
+             u = v_unit(v_cross(vec3(0, 0, 1), n), vec3(1, 0, 0));
   return (sonde_site){.id = id,
                       .position_m = v_whole_nm(sonde_limb_to_model(limb, skin)),
                       .normal = n,
@@ -303,41 +281,19 @@ static uint32_t body_numbers(sonde_limb_body *body, double **number) {
 
 enum { MOST_NUMBERS = 128 };
 
-static sonde_status keep_body(const sonde_limb_body *body, sonde_model *model, sonde_error *error) {
-  sonde_limb_body copy = *body;
-  double *number[MOST_NUMBERS];
-  const uint32_t count = body_numbers(&copy, number);
-  double *to = model->map_origin = SONDE_NEW(double, ORIGIN_HEAD + count);
-  if (!to) return sonde_fail_memory(error);
-  model->map_origin_count = ORIGIN_HEAD + count;
-  to[0] = ORIGIN_VERSION, to[1] = body->sex, to[2] = body->side;
-  to[3] = (double)(body->seed >> 32), to[4] = (double)(body->seed & 0xffffffffu);
-  for (uint32_t k = 0; k < count; ++k) to[ORIGIN_HEAD + k] = *number[k];
-  return SONDE_OK;
-}
-
-static bool read_body(const sonde_model *model, sonde_limb_body *body) {
-  const double *from = model->map_origin;
-  double *number[MOST_NUMBERS];
-  *body = sonde_limb_unknown();
-  const uint32_t count = body_numbers(body, number);
-  if (model->map_origin_count != ORIGIN_HEAD + count || from[0] != ORIGIN_VERSION) return false;
-  if (!(from[1] == SONDE_SEX_FEMALE || from[1] == SONDE_SEX_MALE) ||
-      !(from[2] == SONDE_LIMB_RIGHT || from[2] == SONDE_LIMB_LEFT) ||
-      !(from[3] >= 0 && from[3] < 4294967296.0 && from[4] >= 0 && from[4] < 4294967296.0))
-    return false;
-  body->sex = (sonde_sex)from[1], body->side = (sonde_limb_side)from[2];
-  body->seed = (uint64_t)from[3] << 32 | (uint64_t)from[4];
-  for (uint32_t k = 0; k < count; ++k)
-    if (!isfinite(*number[k] = from[ORIGIN_HEAD + k])) return false;
-  return true;
-}
-
 /* ---- the model ---------------------------------------------------------------------------- */
 
 static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sonde_mesh *skin,
                          sonde_mesh *bones, sonde_model **out, sonde_error *error) {
-  sonde_status status = make_meshes(limb, def->edge_m, skin, bones, error);
+  sonde_mesh part = {0};
+  sonde_status status = sonde_limb_skin(limb, def->edge_m, &part, error);
+  if (!status) status = append(limb, &part, skin, error);
+  sonde_mesh_clear(&part);
+  for (int bone = 0; bone < SONDE_LIMB_BONES && !status; ++bone) {
+    status = sonde_limb_bone_mesh(limb, (sonde_limb_bone)bone, BONE_EDGE_M, &part, error);
+    if (!status) status = append(limb, &part, bones, error);
+    sonde_mesh_clear(&part);
+  }
   if (status) return status;
   sonde_limb_station station[SONDE_LIMB_STATIONS];
   sonde_site site[SITES];
@@ -357,8 +313,17 @@ static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sond
   if (!model->anatomy) return sonde_fail_memory(error);
   status = limb_map_create(limb, &model->map, error);
   if (!status) status = lay_axis(limb, model, error);
-  if (!status) status = keep_body(&limb->body, model, error);
   if (status) return status;
+  // The body as numbers, for the file.
+  sonde_limb_body copy = limb->body;
+  double *number[MOST_NUMBERS];
+  const uint32_t count = body_numbers(&copy, number);
+  double *to = model->map_origin = SONDE_NEW(double, ORIGIN_HEAD + count);
+  if (!to) return sonde_fail_memory(error);
+  model->map_origin_count = ORIGIN_HEAD + count;
+  to[0] = ORIGIN_VERSION, to[1] = copy.sex, to[2] = copy.side;
+  to[3] = (double)(copy.seed >> 32), to[4] = (double)(copy.seed & 0xffffffffu);
+  for (uint32_t k = 0; k < count; ++k) to[ORIGIN_HEAD + k] = *number[k];
   lay_springs(limb, def, model);
   // Sites have the springs of the nodes beside them.
   for (uint32_t k = 0; k < SITES; ++k) {
@@ -413,9 +378,23 @@ sonde_status sonde_limb_model_load(const char *path, sonde_model **out, sonde_er
   const double tolerance_m = 1e-6;
   sonde_limb_body body;
   sonde_limb *limb = NULL;
-  if (!read_body(model, &body))
+  // The body from its numbers.
+  const double *from = model->map_origin;
+  double *number[MOST_NUMBERS];
+  body = sonde_limb_unknown();
+  const uint32_t count = body_numbers(&body, number);
+  bool good = model->map_origin_count == ORIGIN_HEAD + count && from[0] == ORIGIN_VERSION &&
+              (from[1] == SONDE_SEX_FEMALE || from[1] == SONDE_SEX_MALE) &&
+              (from[2] == SONDE_LIMB_RIGHT || from[2] == SONDE_LIMB_LEFT) && from[3] >= 0 &&
+              from[3] < 4294967296.0 && from[4] >= 0 && from[4] < 4294967296.0;
+  for (uint32_t k = 0; good && k < count; ++k) good = isfinite(*number[k] = from[ORIGIN_HEAD + k]);
+  if (good) {
+    body.sex = (sonde_sex)from[1], body.side = (sonde_limb_side)from[2];
+    body.seed = (uint64_t)from[3] << 32 | (uint64_t)from[4];
+  } else {
     status = sonde_fail(error, SONDE_VERSION,
                         "%s: describes a limb that this program does not know", path);
+  }
   if (!status) status = sonde_limb_draw(&body, body.seed, &body, error);
   if (!status) status = sonde_limb_create(&body, &limb, error);
   if (!status) status = limb_map_create(limb, &model->map, error);

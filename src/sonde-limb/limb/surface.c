@@ -187,19 +187,6 @@ static void shape_at(double level, double *around) {
   }
 }
 
-// Outermost radius along a ray at which a bone is nearer than `skin`; 0 when none is.
-static double bone_reach(const sonde_limb *limb, sonde_vec3 centre, double angle, double from,
-                         double skin) {
-  double dx = sin(angle), dy = cos(angle);
-  for (double r = from; r > 0.2 * from;) {
-    const double p[3] = {centre.x + r * dx, centre.y + r * dy, centre.z};
-    double d = limb_bone_distance(limb, p, NULL) - skin;
-    if (d < 1e-4) return r;
-    r -= 0.8 * d;
-  }
-  return 0;
-}
-
 // Radii of the fascia in one section: the shape at the size that gives the skin its girth, outside
 // the bones.
 static double fit_section(const double *around, const double *bone, const double *outside,
@@ -351,8 +338,17 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
       sonde_vec3 centre = vec3(s->x[r], s->y[r], limb_z(limb, level));
       for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
         double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
-        bone[r][c] =
-            bone_reach(limb, centre, angle, 1.5 * s->fascia[r][c], level < 0.15 ? 0.003 : 0.0012);
+        // The farthest bone on the ray, with some tissue over it.
+        const double most = 1.5 * s->fascia[r][c], over = level < 0.15 ? 0.003 : 0.0012;
+        bone[r][c] = 0;
+        for (double reach = most, gap; reach > 0.2 * most; reach -= 0.8 * gap) {
+          const double p[3] = {centre.x + reach * sin(angle), centre.y + reach * cos(angle),
+                               centre.z};
+          gap = limb_bone_distance(limb, p, NULL) - over;
+          if (gap >= 1e-4) continue;
+          bone[r][c] = reach;
+          break;
+        }
         outside[c] = s->fat[r][c] + b->skin_m;
       }
       fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);

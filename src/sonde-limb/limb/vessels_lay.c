@@ -52,22 +52,6 @@ static sonde_vec3 groin_point(const sonde_limb *limb, double x, double z, double
   return vec3(x, c.y + limb_fascia_radius(limb, level, angle) * cos(angle) - cover, z);
 }
 
-// The point of a level and an angle, outside of the femur, whose distance to bone is `away`.
-static sonde_vec3 off_femur(const sonde_limb *limb, double level, double degrees, double away) {
-  double low = 0, high = 0.9;
-  sonde_vec3 p = limb_at(limb, level, degrees, high);
-  for (int k = 0; k < 20; ++k) {
-    double f = 0.5 * (low + high);
-    p = limb_at(limb, level, degrees, f);
-    const double at[3] = {p.x, p.y, p.z};
-    if (limb_bone_distance(limb, at, NULL) < away)
-      low = f;
-    else
-      high = f;
-  }
-  return p;
-}
-
 // The knots of the artery from the pelvis to the end of the tibioperoneal trunk.
 static uint32_t main_artery(const struct limb_vessels *v, sonde_vec3 *knot) {
   const sonde_limb *limb = v->limb;
@@ -93,8 +77,14 @@ static uint32_t main_artery(const struct limb_vessels *v, sonde_vec3 *knot) {
     double degrees = femoral[k][1] + turn * (level < 1 ? 1 : 0.3);
     level += shift * near;
     // In the canal the third number is the distance from the femur, m; elsewhere a fraction.
-    knot[n++] = femoral[k][2] < 0.1 ? off_femur(limb, level, degrees, femoral[k][2])
-                                    : limb_at(limb, level, degrees, femoral[k][2]);
+    double f = femoral[k][2], low = 0, high = 0.9;
+    for (int step = 0; femoral[k][2] < 0.1 && step < 20; ++step) {
+      f = 0.5 * (low + high);
+      sonde_vec3 p = limb_at(limb, level, degrees, f);
+      const double at[3] = {p.x, p.y, p.z};
+      *(limb_bone_distance(limb, at, NULL) < femoral[k][2] ? &low : &high) = f;
+    }
+    knot[n++] = limb_at(limb, level, degrees, f);
   }
   knot[n++] = limb_at(limb, fmax(d->trunk_end, 1.145), 134, 0.28);
   return n;

@@ -28,8 +28,11 @@ static sonde_vec3 node_of(const struct limb_vessels *v, uint32_t place) {
   return v->node[v->place[place].node];
 }
 
-static void list_places(neighbours *n) {
-  struct limb_vessels *v = n->v;
+// Lists the pairs of a place and a piece of another branch that come near each other while both
+// move by less than 3 mm. @return false without memory
+static bool list_pairs(neighbours *n) {
+  const struct limb_vessels *v = n->v;
+  // Places by slabs of height.
   n->top = 0.1 * v->limb->scale + 0.02;
   for (uint32_t b = 0; b < v->branches; ++b)
     for (uint32_t k = 0; k < v->branch[b].count; ++k) n->owner[v->branch[b].first + k] = b;
@@ -38,13 +41,6 @@ static void list_places(neighbours *n) {
   for (uint32_t s = 0; s < SLABS; ++s) n->begin[s] = sum, sum += count[s], count[s] = n->begin[s];
   n->begin[SLABS] = sum;
   for (uint32_t i = 0; i < v->places; ++i) n->listed[count[slab_of(n, node_of(v, i).z)]++] = i;
-}
-
-// Lists the pairs of a place and a piece of another branch that come near each other while both
-// move by less than 3 mm. @return false without memory
-static bool list_pairs(neighbours *n) {
-  const struct limb_vessels *v = n->v;
-  list_places(n);
   n->pairs = 0;
   for (uint32_t i = 0; i < v->places; ++i) {
     sonde_vec3 p = node_of(v, i);

@@ -65,17 +65,6 @@ static sonde_status find_axis(sonde_interior *in, sonde_error *error) {
   return SONDE_OK;
 }
 
-// A limb's axis is the model's z; its columns turn about the middles of the bones.
-static void find_limb_axis(sonde_interior *in) {
-  const sonde_mesh *skin = &in->model->surface;
-  double low = INFINITY, high = -INFINITY;
-  for (uint32_t v = 0; v < skin->vertex_count; ++v)
-    low = fmin(low, skin->vertices[v].z), high = fmax(high, skin->vertices[v].z);
-  in->origin = vec3(0, 0, 0.5 * (low + high));
-  in->e1 = vec3(1, 0, 0), in->e2 = vec3(0, 1, 0), in->axis = vec3(0, 0, 1);
-  in->bone_radius_m = shaft_m;
-}
-
 // Middle of a limb's bones at a height, smoothed along it; beyond the ends it goes straight on.
 static sonde_vec3 middle_at(const sonde_interior *in, double s) {
   const sonde_vec3 *line = in->model->bone_axis_m;
@@ -293,7 +282,16 @@ sonde_status sonde_columns_create(sonde_interior *in, sonde_error *error) {
   const bool limb = in->model->bone_axis_m != NULL;
   if (limb && in->model->bone_axis_count < 2)
     return sonde_fail(error, SONDE_ARGUMENT, "expected two points or more of the bones' middle");
-  if (status == SONDE_OK && limb) find_limb_axis(in);
+  if (status == SONDE_OK && limb) {
+    // A limb's axis is the model's z; its columns turn about the middles of the bones.
+    const sonde_mesh *surface = &in->model->surface;
+    double first = INFINITY, last = -INFINITY;
+    for (uint32_t v = 0; v < surface->vertex_count; ++v)
+      first = fmin(first, surface->vertices[v].z), last = fmax(last, surface->vertices[v].z);
+    in->origin = vec3(0, 0, 0.5 * (first + last));
+    in->e1 = vec3(1, 0, 0), in->e2 = vec3(0, 1, 0), in->axis = vec3(0, 0, 1);
+    in->bone_radius_m = shaft_m;
+  }
   if (status == SONDE_OK && !limb) status = find_axis(in, error);
   if (status != SONDE_OK) return status;
   // Rows between the ends of the skin along the femur.

@@ -158,21 +158,6 @@ static sonde_status lay_out(sonde_interior *in, const sonde_vessel *vein,
   return SONDE_OK;
 }
 
-// Where a branch opens into another vessel two walls would move the same tissue: there that of the
-// branch does not, and beyond it leads the more the farther the two walls are apart.
-static void couple_to_parents(const sonde_interior *in, uint32_t which,
-                              sonde_vessel_section *section) {
-  for (uint32_t other = 0; other < which; ++other) {
-    sonde_vessel_state v;
-    double along = sonde_vessel_along(in, other, section->rest_m, section->s_m);
-    if (!sonde_vessel_at(in, other, along, &v)) continue;
-    sonde_vec3 d = v_sub(section->rest_m, v.rest_centre_m);
-    d = v_madd(d, -v_dot(d, v.axis), v.axis);
-    double gap = v_norm(d) - v.rest_radius_m - section->radius_m;
-    section->coupling = fmin(section->coupling, clamp(gap / (full_gap * section->radius_m), 0, 1));
-  }
-}
-
 sonde_status sonde_sections_create(sonde_interior *in, sonde_error *error) {
   const sonde_thigh_anatomy *anatomy = in->model->anatomy;
   const struct sonde_tissue_map *map = in->model->map;
@@ -194,7 +179,18 @@ sonde_status sonde_sections_create(sonde_interior *in, sonde_error *error) {
         map->depths(map->self, section->rest_m, &depths);
         section->in_fat = depths.fascia_m > 0;
       }
-      couple_to_parents(in, which, section);
+      // Where a branch opens into another vessel two walls would move the same tissue: there that
+      // of the branch does not, and beyond it leads the more the farther the two walls are apart.
+      for (uint32_t other = 0; other < which; ++other) {
+        sonde_vessel_state v;
+        double along = sonde_vessel_along(in, other, section->rest_m, section->s_m);
+        if (!sonde_vessel_at(in, other, along, &v)) continue;
+        sonde_vec3 d = v_sub(section->rest_m, v.rest_centre_m);
+        d = v_madd(d, -v_dot(d, v.axis), v.axis);
+        double gap = v_norm(d) - v.rest_radius_m - section->radius_m;
+        section->coupling =
+            fmin(section->coupling, clamp(gap / (full_gap * section->radius_m), 0, 1));
+      }
       in->course[which].lies[section->in_fat] = true;
     }
   }
