@@ -81,7 +81,6 @@ typedef struct sonde_surface_law {
 /** A thigh's in-plane (N/m) and tangential (N/m^3) stiffness (docs/fit.md). */
 #define SONDE_SKIN_INPLANE_N_M 35.0
 #define SONDE_SKIN_TANGENTIAL_N_M3 1e5
-
 /** Defaults with all documented values; see docs/tissue.md. @thread any */
 SONDE_API sonde_surface_law sonde_surface_law_default(void);
 
@@ -113,7 +112,6 @@ typedef struct sonde_vessel_point {
 } sonde_vessel_point;
 
 enum { SONDE_VESSEL_POINTS = 64 };
-
 typedef struct sonde_vessel {
   uint32_t count;
   sonde_vessel_point point[SONDE_VESSEL_POINTS];

@@ -239,30 +239,6 @@ static void recentre(double *x, double *y, double *radius) {
   }
 }
 
-// At the groin the skin runs from the thigh over the fat in front of the ramus to the middle of the
-// body: the contour has no hollow beside the bone. Chords over every side of the ray bound it.
-static void fill_hollows(double level, double *radius) {
-  const double from = 0.12, to = 0.22;
-  double t = clamp((level - from) / (to - from), 0, 1), share = 1 - t * t * (3 - 2 * t);
-  double x[LIMB_ANGLES], y[LIMB_ANGLES], hull[LIMB_ANGLES];
-  if (share <= 0) return;
-  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-    double a = 2 * SONDE_PI * c / LIMB_ANGLES;
-    x[c] = radius[c] * sin(a), y[c] = radius[c] * cos(a), hull[c] = radius[c];
-  }
-  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-    double a = 2 * SONDE_PI * c / LIMB_ANGLES, dx = sin(a), dy = cos(a);
-    for (uint32_t i = 1; i < LIMB_ANGLES / 2; ++i)
-      for (uint32_t j = 1; i + j < LIMB_ANGLES / 2; ++j) {
-        uint32_t p = (c + LIMB_ANGLES - i) % LIMB_ANGLES, q = (c + j) % LIMB_ANGLES;
-        double left = dy * x[p] - dx * y[p], right = dy * x[q] - dx * y[q];
-        double u = left / (left - right);
-        hull[c] = fmax(hull[c], (x[p] + u * (x[q] - x[p])) * dx + (y[p] + u * (y[q] - y[p])) * dy);
-      }
-  }
-  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) radius[c] += share * (hull[c] - radius[c]);
-}
-
 // The fascia of a row: what the bones add and what the size loses by them, spread over neighbouring
 // rows, and outside every bone.
 static void spread_push(const limb_surface *s, double (*pushed)[LIMB_ANGLES],
@@ -285,7 +261,28 @@ static void spread_push(const limb_surface *s, double (*pushed)[LIMB_ANGLES],
         reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
     fascia[c] = fmax(s->fascia[r][c] + sum / weights, reach);
   }
-  fill_hollows(level, fascia);
+  // At the groin the skin runs from the thigh over the fat in front of the ramus to the middle of
+  // the body: the contour has no hollow beside the bone. Chords over every side of the ray bound
+  // it.
+  const double from = 0.12, to = 0.22;
+  double t = clamp((level - from) / (to - from), 0, 1), share = 1 - t * t * (3 - 2 * t);
+  double x[LIMB_ANGLES], y[LIMB_ANGLES], hull[LIMB_ANGLES];
+  if (share <= 0) return;
+  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+    double a = 2 * SONDE_PI * c / LIMB_ANGLES;
+    x[c] = fascia[c] * sin(a), y[c] = fascia[c] * cos(a), hull[c] = fascia[c];
+  }
+  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+    double a = 2 * SONDE_PI * c / LIMB_ANGLES, dx = sin(a), dy = cos(a);
+    for (uint32_t i = 1; i < LIMB_ANGLES / 2; ++i)
+      for (uint32_t j = 1; i + j < LIMB_ANGLES / 2; ++j) {
+        uint32_t p = (c + LIMB_ANGLES - i) % LIMB_ANGLES, q = (c + j) % LIMB_ANGLES;
+        double left = dy * x[p] - dx * y[p], right = dy * x[q] - dx * y[q];
+        double u = left / (left - right);
+        hull[c] = fmax(hull[c], (x[p] + u * (x[q] - x[p])) * dx + (y[p] + u * (y[q] - y[p])) * dy);
+      }
+  }
+  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) fascia[c] += share * (hull[c] - fascia[c]);
 }
 
 sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {

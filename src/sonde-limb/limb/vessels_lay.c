@@ -284,29 +284,25 @@ void limb_vessels_lay_deep_femoral(struct limb_vessels *v) {
   add_through(v, spec, knot, 3);
 }
 
-// Greatest radius of the popliteal vein: between the knee's bones and the fascia stand also the
-// artery, the tibial nerve and what keeps them apart. A straight knee narrows the vein of a lean
-// leg.
-static double popliteal_room(const struct limb_vessels *v) {
-  const double others = BONE_GAP + 2 * (v->draws.radius[DIA_POPA] + ARTERY_WALL) + WALL_GAP +
-                        2 * VEIN_WALL + 0.0068; // 4.5 mm of nerve, 2.3 mm around it
-  double least = INFINITY;
-  for (double level = 0.9; level < 1.06; level += 0.02) {
-    double depth = 0.004, radius = limb_fascia_radius(v->limb, level, SONDE_PI);
-    for (; depth < radius; depth += 0.0005) {
-      sonde_vec3 p = limb_below_fascia(v->limb, level, 183, depth);
-      const double at[3] = {p.x, p.y, p.z};
-      if (limb_bone_distance(v->limb, at, NULL) < 0) break;
-    }
-    least = fmin(least, depth);
-  }
-  return fmax(0.5 * (least - others), 0.0018);
-}
-
 void limb_vessels_lay_veins(struct limb_vessels *v) {
   const sonde_limb *limb = v->limb;
   const vessel_draws *d = &v->draws;
-  double *r = v->draws.radius, room = popliteal_room(v);
+  // Greatest radius of the popliteal vein: between the knee's bones and the fascia stand also the
+  // artery, the tibial nerve and what keeps them apart. A straight knee narrows the vein of a lean
+  // leg.
+  double *r = v->draws.radius, least = INFINITY;
+  const double others = BONE_GAP + 2 * (r[DIA_POPA] + ARTERY_WALL) + WALL_GAP + 2 * VEIN_WALL +
+                        0.0068; // 4.5 mm of nerve, 2.3 mm around it
+  for (double level = 0.9; level < 1.06; level += 0.02) {
+    double depth = 0.004, radius = limb_fascia_radius(limb, level, SONDE_PI);
+    for (; depth < radius; depth += 0.0005) {
+      sonde_vec3 p = limb_below_fascia(limb, level, 183, depth);
+      const double at[3] = {p.x, p.y, p.z};
+      if (limb_bone_distance(limb, at, NULL) < 0) break;
+    }
+    least = fmin(least, depth);
+  }
+  const double room = fmax(0.5 * (least - others), 0.0018);
   r[DIA_POPV] = fmin(r[DIA_POPV], room), r[DIA_TPV] = fmin(r[DIA_TPV], 0.95 * r[DIA_POPV]);
   double hiatus = limb_z(limb, d->hiatus), split = limb_z(limb, fmin(1.13, d->trunk_end - 0.004));
   const radius_step step[] = {{1, r[DIA_EIV]},

@@ -114,21 +114,6 @@ static size_t carve(sonde_state *s, char *base) {
   return offset;
 }
 
-static sonde_status order_faces(sonde_state *state, sonde_error *error) {
-  const sonde_mesh *mesh = &state->model->surface;
-  sonde_keyed *list = SONDE_NEW(sonde_keyed, mesh->face_count);
-  if (!list) return sonde_fail_memory(error);
-  for (uint32_t f = 0; f < mesh->face_count; ++f) {
-    sonde_vec3 c = vec3(0, 0, 0);
-    for (int k = 0; k < 3; ++k) c = v_madd(c, 1.0 / 3, mesh->vertices[mesh->faces[f][k]]);
-    list[f] = (sonde_keyed){sonde_morton_key(c), f};
-  }
-  qsort(list, mesh->face_count, sizeof *list, sonde_keyed_compare);
-  for (uint32_t f = 0; f < mesh->face_count; ++f) state->face_order[f] = list[f].index;
-  sonde_free(list);
-  return SONDE_OK;
-}
-
 sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_world_def *def,
                                         const uint32_t *face_order, sonde_state **out,
                                         sonde_error *error) {
@@ -150,8 +135,20 @@ sonde_status sonde_state_create_ordered(const sonde_model *model, const sonde_wo
   status = state->block ? SONDE_OK : sonde_fail_memory(error);
   if (!status && face_order)
     memcpy(state->face_order, face_order, model->surface.face_count * sizeof *face_order);
-  else if (!status)
-    status = order_faces(state, error);
+  // Faces along a space-filling curve.
+  if (!status && !face_order) {
+    const sonde_mesh *mesh = &model->surface;
+    sonde_keyed *list = SONDE_NEW(sonde_keyed, mesh->face_count);
+    if (!list) status = sonde_fail_memory(error);
+    for (uint32_t f = 0; list && f < mesh->face_count; ++f) {
+      sonde_vec3 c = vec3(0, 0, 0);
+      for (int k = 0; k < 3; ++k) c = v_madd(c, 1.0 / 3, mesh->vertices[mesh->faces[f][k]]);
+      list[f] = (sonde_keyed){sonde_morton_key(c), f};
+    }
+    if (list) qsort(list, mesh->face_count, sizeof *list, sonde_keyed_compare);
+    for (uint32_t f = 0; list && f < mesh->face_count; ++f) state->face_order[f] = list[f].index;
+    sonde_free(list);
+  }
   if (!status) status = calls->create(model, def, state->face_order, &state->engine, error);
   if (!status && def->engine == SONDE_ENGINE_DOUBLE) state->precise = state->engine;
   if (status) {
