@@ -12,8 +12,8 @@ SONDE_LINK sonde_status sonde_png_encode(const sonde_image *image, uint8_t **byt
 
 // A PNG of indexed colours, animated when it has several frames. *bytes [*count] freed by
 // sonde_free.
-sonde_status sonde_colours_encode(const sonde_colours *picture, uint8_t **bytes,
-                                             size_t *count, sonde_error *error);
+sonde_status sonde_colours_encode(const sonde_colours *picture, uint8_t **bytes, size_t *count,
+                                  sonde_error *error);
 
 // The first frame stored within an SVG drawing, stretched to a box. @return MEMORY or IO
 SONDE_LINK sonde_status sonde_svg_put_colours(sonde_file *file, double x, double y, double width,
