@@ -8,7 +8,7 @@ static const struct position_row {
   double flexion, rotation, abduction, knee; // degrees
 } POSITIONS[SONDE_LIMB_POSITIONS] = {[SONDE_LIMB_SUPINE_TURNED] = {"supine turned", 6, 30, 15, 20},
                                      [SONDE_LIMB_PRONE_BENT] = {"prone bent", 0, 0, 0, 25},
-                                     [SONDE_LIMB_SITTING] = {"sitting", 45, 0, 10, 45},
+                                     [SONDE_LIMB_SITTING] = {"sitting", 40, 0, 10, 45},
                                      [SONDE_LIMB_SUPINE] = {"supine", 0, 0, 0, 0},
                                      [SONDE_LIMB_PRONE] = {"prone", 0, 0, 0, 0},
                                      [SONDE_LIMB_STANDING] = {"standing", 0, 0, 0, 0}};

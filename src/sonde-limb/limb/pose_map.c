@@ -23,11 +23,11 @@ static double ramp(double angle, double from, double to, double *slope) {
   return steep * (u - end / 2);
 }
 
-// Distance to a bone, exact below 25 mm and more than that beyond.
+// Distance to a bone, exact below 30 mm and more than that beyond.
 static double to_bone(const sonde_limb_pose *pose, uint32_t bone, sonde_vec3 p) {
   const struct limb_bones *b = pose->limb->bones;
   double gap = fmax(b->low[bone] - p.z, p.z - b->high[bone]);
-  return gap > 0.025 ? gap : limb_one_bone(b, bone, p);
+  return gap > 0.03 ? gap : limb_one_bone(b, bone, p);
 }
 
 // 0 at a distance of 0 and below, 1 from `reach` on.
@@ -83,6 +83,12 @@ sonde_vec3 limb_pose_joints(const sonde_limb_pose *pose, sonde_vec3 p) {
   sonde_vec3 aside = v_madd(p, -toward, pole);
   double across = v_norm(aside), r = v_norm(p);
   double share = ramp(atan2(across, toward), from, to, &slope), free = 1;
+  // Down the thigh the turn is whole, on its medial side too, where the cone would go on to the
+  // knee.
+  const double down = 0.24, whole = 0.4;
+  double near = clamp((whole - r) / (whole - down), 0, 1);
+  near *= near * (3 - 2 * near);
+  share = 1 - near * (1 - share), slope *= near;
   if (r < far) {
     double pelvis = to_bone(pose, SONDE_LIMB_PELVIS, p), femur = to_bone(pose, SONDE_LIMB_FEMUR, p);
     double h = clear_of(pelvis, 0.008), f = clear_of(femur, 0.008);
