@@ -7,7 +7,7 @@
 #include <string.h>
 
 static const char VERB[] = "cases";
-static const char *const THIGHS[] = {"bundled", "generated", "model"};
+static const char *const THIGHS[] = {"bundled", "generated", "model", "leg"};
 
 typedef struct options {
   const char *cases, *check, *output;

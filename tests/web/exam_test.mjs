@@ -51,7 +51,7 @@ async function held(page, depth) {
 async function press(page) {
   const before = (await state(page)).exam.presses.length;
   const named = () => ["complete", "open", "too_hard"].includes(window.sonde.exam.compression?.state);
-  for (let depth = 16; depth <= 45; depth += 1.5) {
+  for (let depth = 5; depth <= 45; depth += 1.5) {
     await page.evaluate((d) => window.sonde.setDepth(d), depth);
     await held(page, depth);
     if (await page.evaluate(named)) break;
