@@ -222,13 +222,13 @@ static sonde_status take(scene *s, const char *id, uint64_t leg, uint64_t seed, 
   return SONDE_OK;
 }
 
-// A case on the leg of a seed: what the case says of the body stays, the rest is drawn.
+// A case on the thigh of a seed, with little fat in front, so that the vein is pressed hard.
 static sonde_status play(const sonde_case *from, uint64_t leg, long pictures, uint64_t seed,
                          totals *t, FILE *csv, sonde_error *error) {
   const sonde_world_def def = sonde_world_def_default();
   scene s = {0};
   sonde_case c = *from;
-  c.thigh = SONDE_CASE_GENERATED, c.seed = leg;
+  c.thigh = SONDE_CASE_GENERATED, c.seed = leg, c.known.fat_front_m = 0.005;
   sonde_status status = sonde_case_build(&c, NULL, NULL, &s.setup, error);
   if (!status) status = sonde_state_create(s.setup.model, &def, &s.state, error);
   if (!status) status = sonde_interior_create(s.setup.model, &s.interior, error);

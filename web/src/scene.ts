@@ -283,7 +283,7 @@ export class ThighScene {
     const vein = line.part === PART.vein || (line.part >= PART.branch && line.part % 2 === 0);
     const branch = line.part >= PART.branch;
     this.vessels.set(line.part, { points: line.points.slice(), vein });
-    const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), branch ? 40 : 96, radius / points.length, branch ? 8 : 16);
+    const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), branch ? 24 : 96, radius / points.length, branch ? 6 : 16);
     const colour = vein ? COLOUR.vein : COLOUR.artery;
     const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.55, emissive: colour, emissiveIntensity: 0.25 });
     this.replaceInside(`vessel ${line.part}`, new THREE.Mesh(tube, material));

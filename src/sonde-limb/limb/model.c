@@ -8,7 +8,7 @@
 #include <string.h>
 
 enum { COURSE_SITES = 24, SITES = SONDE_LIMB_STATIONS + COURSE_SITES };
-static const double FINE_REACH_M = 0.004, BONE_EDGE_M = 0.003, LEAST_TISSUE_M = 0.004;
+static const double FINE_REACH_M = 0.004, BONE_EDGE_M = 0.004, LEAST_TISSUE_M = 0.004;
 // A tendon is stiffer than muscle: it counts as so much of its thickness.
 static const double TENDON_SHARE = 0.2;
 enum { DEPTHS = 12 };
