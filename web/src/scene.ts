@@ -19,6 +19,7 @@ const WIDE = 1.3; // width over height in which the whole leg is seen
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
 const MOVED_ALPHA = 0.86;
 const CREASE_RAD = 0.6; // sharper edges are drawn sharp
+const SEEN_COSINE = 0.4; // between the view and the normal of a place: less is on the far side
 const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.85; // of the leg's length: what the camera looks at, and from how far
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
@@ -107,6 +108,7 @@ export class ThighScene {
   private sites: readonly Site[] = [];
   private frame: Frame | null = null;
   private middle_mm = 142;
+  private faced = "";
   private away_mm = 560;
   /** whether the thigh is drawn without WebGL from now on */
   flatChanged: (flat: boolean) => void = () => undefined;
@@ -339,7 +341,21 @@ export class ThighScene {
   }
 
   setTarget(target: Target | null, reached: boolean): void {
-    if (this.target.set(target, reached)) this.dirty = true;
+    if (!this.target.set(target, reached)) return;
+    this.dirty = true;
+    const place = target ? target.position_mm.join() : "";
+    if (target && place !== this.faced) this.face(target);
+    this.faced = place;
+  }
+
+  /** Turns the view about the leg when a new target lies on the side that is not seen. */
+  private face(target: Target): void {
+    const from = this.camera.position.clone().sub(this.orbit.target), out = new THREE.Vector3(...target.normal).normalize();
+    const look = from.clone().normalize();
+    if (out.dot(look) > SEEN_COSINE) return;
+    look.addScaledVector(out, 1.6 - out.dot(look)).normalize();
+    this.camera.position.copy(this.orbit.target).addScaledVector(look, from.length());
+    this.orbit.update();
   }
 
   /** Where the target's name belongs on the canvas, px; null when there is none or it is behind. */
