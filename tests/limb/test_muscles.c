@@ -6,7 +6,7 @@
 #include "limb/muscles.h"
 #include "limb/vessels.h"
 
-enum { FAMILY = 50 };
+enum { FAMILY = 30 };
 
 static uint32_t muscle_named(const char *name) {
   for (uint32_t k = 0; k < sonde_limb_muscle_count(); ++k)
