@@ -13,7 +13,7 @@ let checks = 0;
 const check = (good, what) => (++checks, good || failures.push(what));
 const browser = await openBrowser(web);
 const { page, data, drawings, text } = await openReport(browser.context, file, check);
-check(drawings === 8, `${drawings} figures, expected 8`);
+check(drawings === 9, `${drawings} figures, expected 9`);
 const claims = Object.values(data.claims);
 const rows = await page.$$eval("#claims tbody tr", (list) => list.map((row) => row.textContent));
 check(rows.length === claims.length && claims.length >= 20, `${rows.length} rows for ${claims.length} claims`);

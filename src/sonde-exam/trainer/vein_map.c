@@ -13,7 +13,7 @@ static const struct {
                {"femoral_proximal", "Femoral vein, upper third", 0.40},
                {"femoral_mid", "Femoral vein, middle", 0.65},
                {"femoral_distal", "Femoral vein, lower third", 0.88},
-               {"popliteal", "Popliteal vein", 1.0}};
+               {"popliteal", "Vein behind the knee", 1.0}};
 
 const char *sonde_segment_title(const char *name) {
   for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i)
