@@ -23,12 +23,6 @@ struct sonde_thigh_shape {
   double fat_m[SONDE_TUBE_ROWS][SONDE_TUBE_COLUMNS]; // thickness along the skin's normal
 };
 
-// 0 below 0, 1 above 1, smooth in between.
-static inline double smooth_step(double t) {
-  t = clamp(t, 0, 1);
-  return t * t * (3 - 2 * t);
-}
-
 static inline double tube_angle(uint32_t column) {
   return 2 * SONDE_PI * column / SONDE_TUBE_COLUMNS;
 }

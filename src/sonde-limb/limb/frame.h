@@ -47,6 +47,12 @@ static inline double limb_level(const sonde_limb *limb, double z) {
   return z >= -thigh ? -z / thigh : 1 + (-thigh - z) / calf;
 }
 
+// A point or direction of the right limb in the frame of the limb's own side, and back.
+static inline sonde_vec3 limb_side_point(const sonde_limb *limb, sonde_vec3 p) {
+  if (limb->body.side == SONDE_LIMB_LEFT) p.x = -p.x;
+  return p;
+}
+
 // Centre of the section at a level; x and y only.
 sonde_vec3 limb_centre(const sonde_limb *limb, double level);
 // Radii from the centre: deep fascia, fat (along the ray), skin's outer face.

@@ -32,14 +32,9 @@ static const struct septum {
              {LIMB_LEG_ANTERIOR, LIMB_LEG_DEEP, "interosseous membrane"},
              {LIMB_FILLING, LIMB_FILLING, "vastoadductor membrane"}};
 
-static sonde_vec3 to_right(const sonde_limb *limb, sonde_vec3 p) {
-  if (limb->body.side == SONDE_LIMB_LEFT) p.x = -p.x;
-  return p;
-}
-
 sonde_limb_label sonde_limb_at(const sonde_limb *limb, sonde_vec3 point) {
   SONDE_ASSERT(limb && limb->muscles);
-  sonde_vec3 p = to_right(limb, point);
+  sonde_vec3 p = limb_side_point(limb, point);
   sonde_limb_label label = {SONDE_LIMB_OUTSIDE, 0, limb->body.side};
   double level = limb_level(limb, p.z);
   if (!(level >= LIMB_TOP && level <= 2)) return label;
@@ -156,7 +151,7 @@ limb_layers limb_layers_at(const sonde_limb *limb, sonde_vec3 p) {
 
 sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 point) {
   SONDE_ASSERT(limb && limb->bones);
-  sonde_vec3 p = to_right(limb, point);
+  sonde_vec3 p = limb_side_point(limb, point);
   const double xyz[3] = {p.x, p.y, p.z};
   limb_layers layers = limb_layers_at(limb, p);
   return (sonde_limb_distances){layers.skin, layers.fascia, limb_bone_distance(limb, xyz, NULL),
@@ -167,23 +162,23 @@ sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 poin
 bool sonde_limb_fibre(const sonde_limb *limb, sonde_vec3 point, sonde_vec3 *direction) {
   SONDE_ASSERT(limb && direction);
   if (sonde_limb_at(limb, point).tissue != SONDE_LIMB_MUSCLE) return false;
-  sonde_vec3 p = to_right(limb, point);
+  sonde_vec3 p = limb_side_point(limb, point);
   double level = limb_level(limb, p.z);
   sonde_vec3 c = limb_centre(limb, level);
   limb_cell cell = limb_cell_at(limb, level, p.x - c.x, p.y - c.y);
-  *direction = to_right(limb, limb_fibre(limb, &cell, p));
+  *direction = limb_side_point(limb, limb_fibre(limb, &cell, p));
   return true;
 }
 
 sonde_vec3 sonde_limb_point(const sonde_limb *limb, double level, double angle, double f) {
   double xyz[3];
   limb_point(limb, level, angle, f, xyz);
-  return to_right(limb, vec3(xyz[0], xyz[1], xyz[2]));
+  return limb_side_point(limb, vec3(xyz[0], xyz[1], xyz[2]));
 }
 
 void sonde_limb_polar(const sonde_limb *limb, sonde_vec3 point, double *level, double *angle,
                       double *f) {
-  sonde_vec3 p = to_right(limb, point);
+  sonde_vec3 p = limb_side_point(limb, point);
   const double xyz[3] = {p.x, p.y, p.z};
   limb_polar(limb, xyz, level, angle, f);
 }

@@ -1,12 +1,13 @@
 // The limb as the tissue map of a model: questions in the model's frame, answers of the limb.
 #include "limb/map.h"
 
-#include "limb/muscles.h"
 #include "limb/label.h"
+#include "limb/muscles.h"
+#include "sonde/limb_model.h"
 
 // A point of the model's frame in that of a right limb.
 static sonde_vec3 in_limb(const sonde_limb *limb, sonde_vec3 p) {
-  return vec3(limb->body.side == SONDE_LIMB_LEFT ? -p.x : p.x, p.y, limb_z(limb, LIMB_TOP) - p.z);
+  return limb_side_point(limb, sonde_limb_to_model(limb, p));
 }
 
 static void depths(const void *self, sonde_vec3 rest, sonde_tissue_depths *d) {
@@ -34,38 +35,30 @@ static sonde_tissue tissue(const void *self, sonde_vec3 rest) {
       [SONDE_LIMB_WALL] = SONDE_TISSUE_FAT,
       [SONDE_LIMB_LUMEN] = SONDE_TISSUE_FAT,
       [SONDE_LIMB_BONE] = SONDE_TISSUE_BONE};
-  sonde_vec3 p = vec3(rest.x, rest.y, limb_z(limb, LIMB_TOP) - rest.z);
-  return OF[sonde_limb_at(limb, p).tissue];
+  return OF[sonde_limb_at(limb, sonde_limb_to_model(limb, rest)).tissue];
 }
 
-// Where a point lies among the rows of the diagram: x and y from the section's centre.
-typedef struct row_place {
-  uint32_t row;
-  double u, radius, x, y;
-} row_place;
+// Where a point lies in the diagram: x and y from the section's centre, m.
+typedef struct place {
+  limb_row at;
+  double x, y;
+} place;
 
-static row_place place_in(const sonde_limb *limb, sonde_vec3 rest) {
-  const struct limb_muscles *m = limb->muscles;
+static place place_in(const sonde_limb *limb, sonde_vec3 rest) {
   sonde_vec3 p = in_limb(limb, rest);
   double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2);
-  double at = clamp((level - LIMB_TOP) / LIMB_CELL_STEP, 0, LIMB_CELL_ROWS - 1.000001);
   sonde_vec3 c = limb_centre(limb, level);
-  row_place r = {.row = (uint32_t)at, .x = p.x - c.x, .y = p.y - c.y};
-  r.u = at - r.row;
-  r.radius = (1 - r.u) * m->radius[r.row] + r.u * m->radius[r.row + 1];
-  return r;
+  return (place){limb_row_at(limb->muscles, level), p.x - c.x, p.y - c.y};
 }
 
-// A seed there, m from the section's centre, and |p - seed|^2 - weight.
-static double power_at(const struct limb_muscles *m, const row_place *r, uint32_t seed, double *x,
+// A seed there, m from the section's centre, and |p - seed|^2 - weight, m^2.
+static double power_at(const struct limb_muscles *m, const place *p, uint32_t seed, double *x,
                        double *y) {
-  const limb_seed *a = &m->seed[r->row][seed], *b = &m->seed[r->row + 1][seed];
-  double v = 1 - r->u, s = r->radius;
-  *x = s * (v * (double)a->x + r->u * (double)b->x);
-  *y = s * (v * (double)a->y + r->u * (double)b->y);
-  double weight = v * (double)a->weight + r->u * (double)b->weight;
-  double dx = r->x - *x, dy = r->y - *y;
-  return dx * dx + dy * dy - s * s * weight;
+  const double radius = p->at.radius;
+  float sx, sy, px = (float)(p->x / radius), py = (float)(p->y / radius);
+  double power = (double)limb_seed_power(m, &p->at, seed, px, py, &sx, &sy);
+  *x = radius * (double)sx, *y = radius * (double)sy;
+  return radius * radius * power;
 }
 
 static uint32_t seeds(const void *self, sonde_vec3 rest, double within_m, uint32_t room,
@@ -73,12 +66,12 @@ static uint32_t seeds(const void *self, sonde_vec3 rest, double within_m, uint32
   const sonde_limb *limb = self;
   const struct limb_muscles *m = limb->muscles;
   SONDE_ASSERT(m && room > 0 && seed);
-  row_place r = place_in(limb, rest);
+  const place r = place_in(limb, rest);
   double power[LIMB_SEEDS], x[LIMB_SEEDS], y[LIMB_SEEDS];
-  const uint32_t active = m->active_count[r.row];
+  const uint32_t active = m->active_count[r.at.row];
   uint32_t best = 0, count = 0;
   for (uint32_t i = 0; i < active; ++i) {
-    power[i] = power_at(m, &r, m->active[r.row][i], &x[i], &y[i]);
+    power[i] = power_at(m, &r, m->active[r.at.row][i], &x[i], &y[i]);
     if (power[i] < power[best]) best = i;
   }
   // A cell is as far as its boundary with the cell of the point; insertion by that distance.
@@ -90,7 +83,7 @@ static uint32_t seeds(const void *self, sonde_vec3 rest, double within_m, uint32
     if (away > within_m || (count == room && away >= far[count - 1])) continue;
     uint32_t k = count < room ? count++ : count - 1;
     for (; k > 0 && far[k - 1] > away; --k) far[k] = far[k - 1], seed[k] = seed[k - 1];
-    far[k] = away, seed[k] = m->active[r.row][i];
+    far[k] = away, seed[k] = m->active[r.at.row][i];
   }
   return count;
 }
@@ -99,15 +92,15 @@ static sonde_map_seed seed_facts(const void *self, uint32_t seed, sonde_vec3 res
   const sonde_limb *limb = self;
   const struct limb_muscles *m = limb->muscles;
   SONDE_ASSERT(seed < m->seed_count);
-  row_place r = place_in(limb, rest);
-  limb_cell cell = {.cell = m->cell_of[seed], .seed = seed, .row = r.row};
+  const place r = place_in(limb, rest);
+  limb_cell cell = {.cell = m->cell_of[seed], .seed = seed, .row = r.at.row};
   sonde_map_seed facts = {.cell = cell.cell,
                           .section = (uint32_t)limb_cell_compartment(cell.cell),
                           .muscle = cell.cell < SONDE_LIMB_MUSCLES,
                           .fibre = vec3(0, 0, 1)};
   if (!facts.muscle) return facts;
   sonde_vec3 fibre = limb_fibre(limb, &cell, in_limb(limb, rest));
-  facts.fibre = vec3(limb->body.side == SONDE_LIMB_LEFT ? -fibre.x : fibre.x, fibre.y, -fibre.z);
+  facts.fibre = limb_side_point(limb, vec3(fibre.x, fibre.y, -fibre.z));
   facts.pennation_rad = limb_muscle_table[cell.cell].pennation_deg * SONDE_PI / 180;
   return facts;
 }
@@ -115,12 +108,11 @@ static sonde_map_seed seed_facts(const void *self, uint32_t seed, sonde_vec3 res
 static void powers(const void *self, sonde_vec3 rest, uint32_t count, const uint32_t *seed,
                    double *power, sonde_vec3 *at) {
   const sonde_limb *limb = self;
-  row_place r = place_in(limb, rest);
-  const double side = limb->body.side == SONDE_LIMB_LEFT ? -1 : 1;
+  const place r = place_in(limb, rest);
   for (uint32_t k = 0; k < count; ++k) {
     double x, y;
     power[k] = power_at(limb->muscles, &r, seed[k], &x, &y);
-    if (at) at[k] = vec3(rest.x + side * (x - r.x), rest.y + y - r.y, rest.z);
+    if (at) at[k] = v_add(rest, limb_side_point(limb, vec3(x - r.x, y - r.y, 0)));
   }
 }
 

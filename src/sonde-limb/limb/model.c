@@ -9,9 +9,9 @@
 
 enum { COURSE_SITES = 24, SITES = SONDE_LIMB_STATIONS + COURSE_SITES };
 static const double FINE_REACH_M = 0.004, BONE_EDGE_M = 0.004, LEAST_TISSUE_M = 0.004;
-// A tendon is stiffer than muscle: it counts as so much of its thickness.
+// A tendon yields less than muscle: a layer of it counts as muscle of this share of its thickness.
 static const double TENDON_SHARE = 0.2;
-enum { DEPTHS = 12 };
+enum { DEPTHS = 12 }; // places between fascia and bone where the tissue is asked for
 
 sonde_limb_model_def sonde_limb_model_def_default(void) {
   return (sonde_limb_model_def){"limb", "Synthetic limb, not measured", 0.006, 0.003, 1, 0.02};
@@ -22,7 +22,8 @@ sonde_vec3 sonde_limb_to_model(const sonde_limb *limb, sonde_vec3 p) {
   return vec3(p.x, p.y, limb_z(limb, LIMB_TOP) - p.z);
 }
 
-// Appends a mesh in the model's frame: its z runs the other way, so that its faces turn round.
+// Appends a mesh of the limb's frame to one of the model's, whose z runs the other way: corners of
+// the faces change their order, so that they stay counter-clockwise from outside.
 static sonde_status append(const sonde_limb *limb, const sonde_mesh *from, sonde_mesh *to,
                            sonde_error *error) {
   sonde_mesh all;
@@ -54,10 +55,10 @@ static sonde_status lay_axis(const sonde_limb *limb, sonde_model *model, sonde_e
   sonde_vec3 *p = model->bone_axis_m;
   for (uint32_t k = 0; k < POINTS; ++k) {
     double level = LIMB_TOP + k * (2 - LIMB_TOP) / (POINTS - 1), z = limb_z(limb, level);
-    double t = clamp(level / neck_end, 0, 1), down = clamp((level - 0.94) / 0.12, 0, 1);
-    sonde_vec3 shaft = v_scale(limb_shaft_axis(&limb->body, fmax(level, 0)), t * t * (3 - 2 * t));
+    sonde_vec3 shaft =
+        v_scale(limb_shaft_axis(&limb->body, fmax(level, 0)), smooth_step(level / neck_end));
     sonde_vec3 shin = limb_tibia_axis(&limb->body, fmax(level, 1));
-    sonde_vec3 at = v_lerp(shaft, shin, down * down * (3 - 2 * down));
+    sonde_vec3 at = v_lerp(shaft, shin, smooth_step((level - 0.94) / 0.12));
     p[k] = vec3(mirror * at.x, at.y, z);
   }
   for (int pass = 0; pass < PASSES; ++pass) {
@@ -72,7 +73,8 @@ static sonde_status lay_axis(const sonde_limb *limb, sonde_model *model, sonde_e
   return SONDE_OK;
 }
 
-// Layers and springs of every node, from the tissue on the way to the nearest bone.
+// Finds layers and springs of every node from the tissue that lies on its inward normal as far as
+// the nearest bone is away.
 static void lay_springs(const sonde_limb *limb, const sonde_limb_model_def *def,
                         sonde_model *model) {
   const sonde_tissue_map *map = model->map;
@@ -123,7 +125,8 @@ static sonde_limb_vessel_point chain_place(const sonde_limb *limb, const chain *
   return sonde_limb_vessel_place(limb, c->branch[k], arc);
 }
 
-// Points at equal arcs; a line that is to run down the leg leaves out those that do not.
+// Lays a line through places at equal arcs of the branches. `down`: places that do not lie lower
+// than the one before are left out, because sections of a main vessel ascend along the leg.
 static void lay_line(const sonde_limb *limb, const chain *c, bool down, sonde_vessel *line) {
   const double step_m = 0.004, least_down_m = 0.002;
   uint32_t most = (uint32_t)clamp(ceil(c->length_m / step_m) + 1, 2, SONDE_VESSEL_POINTS);
@@ -184,8 +187,8 @@ static sonde_site site_at(const sonde_limb *limb, uint32_t id, sonde_vec3 skin, 
                       .v = v_cross(n, u)};
 }
 
-// Sites at the stations and along the main vein, from the side from which the stations before and
-// behind look at it.
+// Sites stand at the stations and along the main vein. Between two stations the side from which the
+// probe looks at the vein turns evenly from that of one to that of the other.
 static void lay_sites(const sonde_limb *limb, const chain *veins,
                       const sonde_limb_station station[SONDE_LIMB_STATIONS],
                       sonde_site site[SITES]) {
@@ -325,7 +328,7 @@ static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sond
   to[3] = (double)(copy.seed >> 32), to[4] = (double)(copy.seed & 0xffffffffu);
   for (uint32_t k = 0; k < count; ++k) to[ORIGIN_HEAD + k] = *number[k];
   lay_springs(limb, def, model);
-  // Sites have the springs of the nodes beside them.
+  // A site has the springs of the node nearest to it.
   for (uint32_t k = 0; k < SITES; ++k) {
     uint32_t at =
         v_nearest(model->surface.vertices, model->surface.vertex_count, model->sites[k].position_m);

@@ -305,31 +305,34 @@ sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
   return SONDE_OK;
 }
 
-limb_cell limb_cell_at(const sonde_limb *limb, double level, double x, double y) {
-  const struct limb_muscles *m = limb->muscles;
+limb_row limb_row_at(const struct limb_muscles *m, double level) {
   SONDE_ASSERT(m);
   double at = clamp((level - LIMB_TOP) / LIMB_CELL_STEP, 0, LIMB_CELL_ROWS - 1.000001);
-  uint32_t row = (uint32_t)at;
-  float u = (float)(at - row), v = 1 - u;
-  double radius = v * m->radius[row] + u * m->radius[row + 1];
-  float px = (float)(x / radius), py = (float)(y / radius), d1 = 1e30F, d2 = 1e30F;
+  limb_row r = {.row = (uint32_t)at};
+  r.u = (float)(at - r.row);
+  r.radius = (1 - r.u) * m->radius[r.row] + r.u * m->radius[r.row + 1];
+  return r;
+}
+
+limb_cell limb_cell_at(const sonde_limb *limb, double level, double x, double y) {
+  const struct limb_muscles *m = limb->muscles;
+  const limb_row at = limb_row_at(m, level);
+  float px = (float)(x / at.radius), py = (float)(y / at.radius), d1 = 1e30F, d2 = 1e30F;
   uint32_t first = 0, second = 0;
-  const limb_seed *a = m->seed[row], *b = m->seed[row + 1];
-  for (uint32_t i = 0; i < m->active_count[row]; ++i) {
-    uint32_t k = m->active[row][i];
-    float dx = px - (v * a[k].x + u * b[k].x), dy = py - (v * a[k].y + u * b[k].y);
-    float d = dx * dx + dy * dy - (v * a[k].weight + u * b[k].weight);
+  float sx[2] = {0, 0}, sy[2] = {0, 0}; // places of the first and the second seed
+  for (uint32_t i = 0; i < m->active_count[at.row]; ++i) {
+    uint32_t k = m->active[at.row][i];
+    float kx, ky, d = limb_seed_power(m, &at, k, px, py, &kx, &ky);
     if (d < d1) {
-      if (m->cell_of[k] != m->cell_of[first]) d2 = d1, second = first;
-      d1 = d, first = k;
+      if (m->cell_of[k] != m->cell_of[first]) d2 = d1, second = first, sx[1] = sx[0], sy[1] = sy[0];
+      d1 = d, first = k, sx[0] = kx, sy[0] = ky;
     } else if (d < d2 && m->cell_of[k] != m->cell_of[first]) {
-      d2 = d, second = k;
+      d2 = d, second = k, sx[1] = kx, sy[1] = ky;
     }
   }
-  double sx = v * (a[first].x - a[second].x) + u * (b[first].x - b[second].x);
-  double sy = v * (a[first].y - a[second].y) + u * (b[first].y - b[second].y);
-  double boundary = d2 < 1e29F ? 0.5 * (d2 - d1) / (hypot(sx, sy) + 1e-6) * radius : INFINITY;
-  return (limb_cell){m->cell_of[first], m->cell_of[second], boundary, first, row};
+  double apart = hypot((double)(sx[0] - sx[1]), (double)(sy[0] - sy[1]));
+  double boundary = d2 < 1e29F ? 0.5 * (d2 - d1) / (apart + 1e-6) * at.radius : INFINITY;
+  return (limb_cell){m->cell_of[first], m->cell_of[second], boundary, first, at.row};
 }
 
 sonde_vec3 limb_fibre(const sonde_limb *limb, const limb_cell *cell, sonde_vec3 p) {

@@ -73,6 +73,24 @@ typedef struct limb_cell {
   uint32_t row;
 } limb_cell;
 
+// Where a level lies among the rows of the diagram.
+typedef struct limb_row {
+  uint32_t row;
+  float u;       // share of the way to the next row
+  double radius; // mean radius of the fascia there, m
+} limb_row;
+limb_row limb_row_at(const struct limb_muscles *muscles, double level);
+// |p - seed|^2 - weight of a seed there, for a point in mean radii from the section's centre; *x
+// and *y receive the seed's place.
+static inline float limb_seed_power(const struct limb_muscles *m, const limb_row *at, uint32_t seed,
+                                    float px, float py, float *x, float *y) {
+  const limb_seed *a = &m->seed[at->row][seed], *b = &m->seed[at->row + 1][seed];
+  const float u = at->u, v = 1 - u;
+  *x = v * a->x + u * b->x, *y = v * a->y + u * b->y;
+  float dx = px - *x, dy = py - *y;
+  return dx * dx + dy * dy - (v * a->weight + u * b->weight);
+}
+
 sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error);
 limb_cell limb_cell_at(const sonde_limb *limb, double level, double x, double y);
 // Area by the rule at a level, m2: volume, length and profile of a muscle; 0 beyond its ends.

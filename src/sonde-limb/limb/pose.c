@@ -157,8 +157,7 @@ static sonde_status lay_bed(sonde_limb_pose *pose, sonde_error *error) {
   if (pose->setting.position == SONDE_LIMB_SITTING) until = 0.6 * limb->body.thigh_length_m;
   for (int r = 0; r < LIMB_BED_ROWS; ++r) {
     double t = pose->first + r * LIMB_BED_STEP;
-    double u = clamp(fmin(t - from, until - t) / 0.06, 0, 1);
-    pose->lies[r] = u * u * (3 - 2 * u);
+    pose->lies[r] = smooth_step(fmin(t - from, until - t) / 0.06);
     pose->deep[r] = clamp(deepest[r] - pose->low[r] - spare, 0, most);
     pose->centre[r] = 0.5 * (near[r] - far[r]), pose->half[r] = 0.5 * (-far[r] - near[r]);
     // A mean over neighbouring rows that have skin.

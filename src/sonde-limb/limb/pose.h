@@ -30,11 +30,6 @@ struct sonde_limb_pose {
   double plane;                                      // height of the bed beside the limb
 };
 
-static inline sonde_vec3 limb_side_point(const sonde_limb *limb, sonde_vec3 p) {
-  if (limb->body.side == SONDE_LIMB_LEFT) p.x = -p.x;
-  return p;
-}
-
 // Rest to posed before the bed has squeezed it, and with the bed.
 sonde_vec3 limb_pose_joints(const sonde_limb_pose *pose, sonde_vec3 rest);
 sonde_vec3 limb_pose_forward(const sonde_limb_pose *pose, sonde_vec3 rest);

@@ -30,12 +30,6 @@ static double to_bone(const sonde_limb_pose *pose, uint32_t bone, sonde_vec3 p) 
   return gap > 0.03 ? gap : limb_one_bone(b, bone, p);
 }
 
-// 0 at a distance of 0 and below, 1 from `reach` on.
-static double clear_of(double distance, double reach) {
-  double u = clamp(distance / reach, 0, 1);
-  return u * u * (3 - 2 * u);
-}
-
 static sonde_vec3 turn_about(sonde_vec3 axis, double angle, sonde_vec3 v) {
   double c = cos(angle), s = sin(angle);
   return v_madd(v_madd(v_scale(v, c), s, v_cross(axis, v)), (1 - c) * v_dot(axis, v), axis);
@@ -52,11 +46,12 @@ static sonde_vec3 bend_knee(const sonde_limb_pose *pose, sonde_vec3 p) {
     const double patella = 0.65;
     double femur = to_bone(pose, SONDE_LIMB_FEMUR, p), cap = to_bone(pose, SONDE_LIMB_PATELLA, p),
            tibia = fmin(to_bone(pose, SONDE_LIMB_TIBIA, p), to_bone(pose, SONDE_LIMB_FIBULA, p));
-    double f = clear_of(femur, 0.008), k = clear_of(cap, 0.01), t = clear_of(tibia, 0.02);
+    double f = smooth_step(femur / 0.008), k = smooth_step(cap / 0.01),
+           t = smooth_step(tibia / 0.02);
     double of_tibia = (share + 1 - t) * f * k, of_femur = (2 - share - f) * t * k,
            of_patella = (1 - k) * f * t, sum = of_tibia + of_femur + of_patella;
     if (sum > 0) share = (of_tibia + patella * of_patella) / sum;
-    free = clear_of(fmin(femur, fmin(cap, tibia)), 0.02);
+    free = smooth_step(fmin(femur, fmin(cap, tibia)) / 0.02);
   } else if (share <= 0) {
     return p;
   }
@@ -86,15 +81,14 @@ sonde_vec3 limb_pose_joints(const sonde_limb_pose *pose, sonde_vec3 p) {
   // Down the thigh the turn is whole, on its medial side too, where the cone would go on to the
   // knee.
   const double down = 0.24, whole = 0.4;
-  double near = clamp((whole - r) / (whole - down), 0, 1);
-  near *= near * (3 - 2 * near);
+  double near = smooth_step((whole - r) / (whole - down));
   share = 1 - near * (1 - share), slope *= near;
   if (r < far) {
     double pelvis = to_bone(pose, SONDE_LIMB_PELVIS, p), femur = to_bone(pose, SONDE_LIMB_FEMUR, p);
-    double h = clear_of(pelvis, 0.008), f = clear_of(femur, 0.008);
+    double h = smooth_step(pelvis / 0.008), f = smooth_step(femur / 0.008);
     double of_femur = (share + 1 - f) * h, of_pelvis = (2 - share - h) * f;
     if (of_femur + of_pelvis > 0) share = of_femur / (of_femur + of_pelvis);
-    free = clear_of(fmin(pelvis, femur), 0.006);
+    free = smooth_step(fmin(pelvis, femur) / 0.006);
   }
   if (share <= 0) return bent;
   if (slope > 0 && across > 1e-9) {
@@ -120,7 +114,7 @@ static bed_place bed_at(const sonde_limb_pose *pose, double along) {
   uint32_t k = (uint32_t)at;
   // Cubic between rows, flat at rows: the slope is continuous.
   double u = at - k;
-  u = u * u * (3 - 2 * u);
+  u = smooth_step(u);
   return (bed_place){pose->low[k] + u * (pose->low[k + 1] - pose->low[k]),
                      pose->deep[k] + u * (pose->deep[k + 1] - pose->deep[k]),
                      pose->middle[k] + u * (pose->middle[k + 1] - pose->middle[k]),

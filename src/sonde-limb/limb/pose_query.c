@@ -4,8 +4,6 @@
 
 #include <string.h>
 
-static const double MMHG = 133.322;
-
 sonde_vec3 sonde_limb_pose_point(const sonde_limb_pose *pose, sonde_vec3 rest_m) {
   SONDE_ASSERT(pose);
   return limb_side_point(pose->limb, limb_pose_forward(pose, limb_side_point(pose->limb, rest_m)));
@@ -47,7 +45,7 @@ double sonde_limb_pose_pressure(const sonde_limb_pose *pose, sonde_vec3 posed_m)
   // At the groin 10 mmHg lying, 2.5 and 3.2 times as much sitting and standing. Below it 0.7 of the
   // column of blood (1060 kg/m3): closed valves bear the rest, and the ankle has 76 to 79 mmHg.
   const double column = 0.7 * 1060 * 9.81;
-  double groin = 10 * MMHG;
+  double groin = 10 * SONDE_PA_PER_MMHG;
   if (pose->setting.position == SONDE_LIMB_SITTING) groin *= 2.5;
   if (pose->setting.position == SONDE_LIMB_STANDING) groin *= 3.2;
   sonde_vec3 femoral = vec3(0.03 * pose->limb->scale, 0.045, -0.02); // the saphenofemoral junction
@@ -71,7 +69,8 @@ double limb_pose_filling(const sonde_limb_pose *pose, sonde_limb_vessel_kind kin
   }
   const double most = 1.2;
   sonde_vec3 posed = limb_side_point(pose->limb, limb_pose_forward(pose, rest));
-  double above = (sonde_limb_pose_pressure(pose, posed) - 10 * MMHG) / MMHG;
+  double above =
+      (sonde_limb_pose_pressure(pose, posed) - 10 * SONDE_PA_PER_MMHG) / SONDE_PA_PER_MMHG;
   double area = above >= 0 ? 1 + most * (1 - exp(-slope * above / most)) : exp(slope * above);
   // A straight knee narrows the popliteal vein from 7.7 to 4.3 mm; 20 degrees free it.
   double radius = sqrt(area);
@@ -273,7 +272,7 @@ void sonde_limb_pose_stations(const sonde_limb_pose *pose,
     }
     s->depth_m = fmax(v_distance(s->skin_m, s->target_m) - vein.radius_m, 0.001);
     sonde_limb_force_band(s->depth_m, s->force_n);
-    double pressure = sonde_limb_pose_pressure(pose, s->target_m) / (10 * MMHG);
+    double pressure = sonde_limb_pose_pressure(pose, s->target_m) / (10 * SONDE_PA_PER_MMHG);
     for (int i = 0; i < 2; ++i) s->force_n[i] *= fmax(pressure, 0.5);
   }
 }

@@ -265,7 +265,7 @@ static void spread_push(const limb_surface *s, double (*pushed)[LIMB_ANGLES],
   // the body: the contour has no hollow beside the bone. Chords over every side of the ray bound
   // it.
   const double from = 0.12, to = 0.22;
-  double t = clamp((level - from) / (to - from), 0, 1), share = 1 - t * t * (3 - 2 * t);
+  const double share = 1 - smooth_step((level - from) / (to - from));
   double x[LIMB_ANGLES], y[LIMB_ANGLES], hull[LIMB_ANGLES];
   if (share <= 0) return;
   for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {

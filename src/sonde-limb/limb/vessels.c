@@ -224,11 +224,6 @@ const char *limb_vessels_name(const struct limb_vessels *v, limb_part part, uint
 // ---- what the public header asks ----------------------------------------------------------------
 
 // A point or a direction between the limb's own frame and that of a right limb.
-static sonde_vec3 mirrored(const sonde_limb *limb, sonde_vec3 p) {
-  if (limb->body.side == SONDE_LIMB_LEFT) p.x = -p.x;
-  return p;
-}
-
 const sonde_limb_variants *sonde_limb_vessel_variants(const sonde_limb *limb) {
   SONDE_ASSERT(limb && limb->vessels);
   return &limb->vessels->draws.variants;
@@ -279,9 +274,10 @@ sonde_limb_vessel_point sonde_limb_vessel_place(const sonde_limb *limb, uint32_t
   double t = clamp((arc_m - a->arc) / fmax(b->arc - a->arc, 1e-12), 0, 1);
   double radius = a->radius + t * (b->radius - a->radius);
   sonde_vec3 from = v->node[a->node], to = v->node[b->node];
-  return (sonde_limb_vessel_point){mirrored(limb, v_lerp(from, to, t)),
-                                   mirrored(limb, v_unit(v_sub(to, from), vec3(0, 0, -1))), radius,
-                                   a->wall + t * (b->wall - a->wall), SONDE_PI * radius * radius};
+  return (sonde_limb_vessel_point){limb_side_point(limb, v_lerp(from, to, t)),
+                                   limb_side_point(limb, v_unit(v_sub(to, from), vec3(0, 0, -1))),
+                                   radius, a->wall + t * (b->wall - a->wall),
+                                   SONDE_PI * radius * radius};
 }
 
 sonde_limb_valve sonde_limb_vessel_valve(const sonde_limb *limb, uint32_t vessel, uint32_t k) {
@@ -294,7 +290,7 @@ sonde_limb_valve sonde_limb_vessel_valve(const sonde_limb *limb, uint32_t vessel
 sonde_limb_vessel_near sonde_limb_vessel_at(const sonde_limb *limb, sonde_vec3 point_m) {
   SONDE_ASSERT(limb && limb->vessels && v_finite(point_m));
   sonde_limb_vessel_near near = {0};
-  near.lumen_m = limb_vessels_lumen(limb->vessels, mirrored(limb, point_m), &near.vessel,
+  near.lumen_m = limb_vessels_lumen(limb->vessels, limb_side_point(limb, point_m), &near.vessel,
                                     &near.arc_m, &near.wall_m);
   return near;
 }

@@ -177,4 +177,9 @@ static inline double whole_nm(double m) { return nearbyint(m * 1e9) / 1e9; }
 static inline sonde_vec3 v_whole_nm(sonde_vec3 p) {
   return vec3(whole_nm(p.x), whole_nm(p.y), whole_nm(p.z));
 }
+// 0 below 0, 1 above 1, smooth in between.
+static inline double smooth_step(double t) {
+  t = clamp(t, 0, 1);
+  return t * t * (3 - 2 * t);
+}
 #endif
