@@ -181,6 +181,11 @@ sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m);
 // Its inverse: (line, metres beside the plane, depth).
 sonde_vec3 sonde_echo_unplace(const frame *f, sonde_vec3 local_m);
 
+// The middle of what a picture shows of the muscles, at 0.4 of its depth.
+static inline sonde_vec3 sonde_echo_middle(const frame *f) {
+  return pose_apply(f->probe, vec3(0, 0, 0.4 * f->depth_m));
+}
+
 // What a vessel holds: the frame's own pathology in the femoral vein.
 const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which);
 // Share of a vessel's short axis that clot fills at a rest height, from the far side.

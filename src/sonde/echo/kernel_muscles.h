@@ -16,8 +16,8 @@ typedef struct muscle_place {
   floats bright;                   // of its boundary there
 } muscle_place;
 
-// The cell with the least power, and the least of another cell: the boundary lies half the
-// difference over the seeds' distance away.
+// A point lies in the cell whose seed has the least power there. The boundary with the cell of the
+// next power is half the difference of both powers over the distance of both seeds away.
 INLINE muscle_place place_in_muscles(const tissue_job *job, const float *field) {
   const uint32_t n = job->lines;
   floats least = vset(1e30f), next = vset(1e30f), cell = vset(-1);
@@ -28,7 +28,7 @@ INLINE muscle_place place_in_muscles(const tissue_job *job, const float *field) 
     const tissue_cell *c = &job->cell[k];
     const floats power = vload(field + k * n);
     const ints own = cell == c->cell, first = power < least;
-    // The cell so far becomes the next one when another takes its place.
+    // When this seed has the least power so far, the cell that had it before becomes the next one.
     const ints pushed = first & ~own, second = ~first & ~own & (power < next);
     next = vselect(pushed, least, next), next_x = vselect(pushed, x, next_x);
     next_y = vselect(pushed, y, next_y), next_section = vselect(pushed, section, next_section);

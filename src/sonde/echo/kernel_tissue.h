@@ -66,28 +66,30 @@ INLINE void layers(const tissue_job *job, knots *memory, const float *map, const
   ints in_fat = (level[1] >= 0) & (level[2] < 0), in_muscle = (level[1] >= 0) & (level[2] >= 0);
   floats fat_scatter = vset(fat_tissue[0]),
          muscle_scatter = vset(job->plain ? 1 : muscle_tissue[0]);
-  floats fat_loss = vset(fat_tissue[1]);
-  if (!job->plain && vany(in_fat)) fat_scatter += 2.2f * septa(memory, theta, s, depth);
-  if (job->oedema > 0 && vany(in_fat)) {
-    floats fluid = clefts(memory, theta, s, depth, job->oedema);
-    fat_scatter = (fat_scatter * (1 + job->oedema)) * (1 - fluid) + fluid_tissue[0] * fluid;
-    fat_loss += fluid * (fluid_tissue[1] - fat_loss);
-  }
+  floats fat_loss = vset(fat_tissue[1]), fibres = depth, between = vset(0), sheaths = vset(0);
+  const bool mapped = job->cells > 0 && !job->plain;
   // Muscles of a map: each with its own fibres, fat between them, sheaths around them.
-  floats fibres = depth, between = vset(0), sheaths = vset(0);
-  if (job->cells > 0 && vany(in_muscle)) {
+  if (mapped && vany(in_muscle)) {
     muscle_place at = place_in_muscles(job, map + job->lines);
     fibres = depth - at.lean * s + at.turn;
     muscle_scatter = muscle_scatter * at.gain;
     between = 1 - at.muscle, sheaths = at.bright;
   }
+  floats lines = vset(0);
+  if (!job->plain && (vany(in_fat) || vany(between > 0))) lines = septa(memory, theta, s, depth);
+  fat_scatter += 2.2f * lines;
+  if (job->oedema > 0 && vany(in_fat)) {
+    floats fluid = clefts(memory, theta, s, depth, job->oedema);
+    fat_scatter = (fat_scatter * (1 + job->oedema)) * (1 - fluid) + fluid_tissue[0] * fluid;
+    fat_loss += fluid * (fluid_tissue[1] - fat_loss);
+  }
   if (!job->plain && vany(in_muscle))
     muscle_scatter = muscle_scatter * power2(bundles(memory, theta, s, fibres) * 0.16609640474f);
-  if (job->cells > 0) {
-    floats loose = fat_tissue[0] * (job->plain ? vset(1) : 1.4f + septa(memory, theta, s, depth));
+  if (mapped) {
+    floats loose = fat_tissue[0] * (1.4f + lines);
     muscle_scatter = muscle_scatter + between * (loose - muscle_scatter) + sheaths;
     floats thin = vmax(1 - vabs(vload(map)) * (1 / superficial_m), vset(0));
-    fat_scatter += job->plain ? vset(0) : superficial_scatter * thin;
+    fat_scatter += superficial_scatter * thin;
   }
   ints sheath = (level[1] >= 0) & (vabs(level[2]) < 0.7e-3f);
   if (!job->plain && vany(sheath)) {

@@ -187,7 +187,7 @@ static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
   const struct sonde_tissue_map *map = in->model->map;
   job->cells = map != NULL ? echo->cell_count : 0;
   if (job->cells > 0) {
-    const sonde_vec3 look = pose_apply(echo->frame.probe, vec3(0, 0, 0.4 * echo->frame.depth_m));
+    const sonde_vec3 look = sonde_echo_middle(&echo->frame);
     const sonde_vec3 beam = q_rotate(echo->frame.probe.rotation, vec3(0, 0, 1));
     const double flat = fmax(hypot(beam.x, beam.y), 0.1);
     double power[MOST_CELLS];

@@ -250,8 +250,8 @@ static void find_in_view(sonde_echo *echo) {
   const struct sonde_tissue_map *map = in->model->map;
   echo->cell_count = 0;
   if (map != NULL) {
-    const sonde_vec3 look = pose_apply(f->probe, vec3(0, 0, 0.4 * f->depth_m));
-    echo->cell_count = map->seeds(map->self, look, INFINITY, MOST_CELLS, echo->cell);
+    echo->cell_count =
+        map->seeds(map->self, sonde_echo_middle(f), INFINITY, MOST_CELLS, echo->cell);
   }
   echo->fields = lesion_field_at(echo->shown_count, echo->lesion_count, 0) +
                  (map != NULL ? 1 + echo->cell_count : 0);
