@@ -46,16 +46,16 @@ sonde_case sonde_case_default(void) {
 
 // ---- the patient
 
-// Parameters that a map gives, in their units at the boundary.
-static void read_parameters(sonde_reader *reader, sonde_place at, const char *what,
-                            const char *const *more, const sonde_parameter *parameter,
-                            uint32_t count, void *to) {
+// What a map gives of a body that is drawn: its seed, its sex and parameters, in their units at the
+// boundary. `more`: another key of the map, or NULL.
+static sonde_sex read_body(sonde_reader *reader, sonde_place at, const char *what, const char *more,
+                           const sonde_parameter *parameter, uint32_t count, void *to,
+                           uint64_t *seed) {
   enum { KEYS = 48 };
-  const char *keys[KEYS] = {0};
-  uint32_t used = 0;
-  for (; *more; ++more) keys[used++] = *more;
-  SONDE_ASSERT(used + count < KEYS);
-  for (uint32_t i = 0; i < count; ++i) keys[used++] = parameter[i].name;
+  const char *keys[KEYS] = {"seed", "sex"};
+  SONDE_ASSERT(count + 4 <= KEYS);
+  for (uint32_t i = 0; i < count; ++i) keys[2 + i] = parameter[i].name;
+  keys[2 + count] = more;
   sonde_read_keys(reader, at, what, keys);
   for (uint32_t i = 0; i < count; ++i) {
     const sonde_parameter *p = &parameter[i];
@@ -64,6 +64,8 @@ static void read_parameters(sonde_reader *reader, sonde_place at, const char *wh
         sonde_read_real(reader, at, p->name, p->low / p->unit, p->high / p->unit, UNKNOWN);
     *sonde_parameter_of(to, p) = value * p->unit;
   }
+  *seed = sonde_read_integer(reader, at, "seed", 0, UINT32_MAX, 1);
+  return (sonde_sex)sonde_read_choice(reader, at, "sex", sonde_case_sexes, 0);
 }
 
 // A whole limb; or the bundled thigh, a model file, or one that is generated from a seed and what
@@ -73,14 +75,11 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   sonde_place at = sonde_read_find(reader, root, "thigh");
   sonde_place leg = sonde_read_find(reader, root, "leg");
   if (leg && at) sonde_reader_fail(reader, leg, SONDE_FORMAT, "give either leg or thigh");
+  uint32_t count;
   if (leg) {
-    static const char *const BODY[] = {"seed", "sex", "side", NULL};
-    uint32_t count;
     const sonde_parameter *parameter = sonde_limb_parameters(&count);
-    read_parameters(reader, leg, "leg", BODY, parameter, count, &c->leg);
     c->thigh = SONDE_CASE_LEG;
-    c->seed = sonde_read_integer(reader, leg, "seed", 0, UINT32_MAX, 1);
-    c->leg.sex = (sonde_sex)sonde_read_choice(reader, leg, "sex", sonde_case_sexes, 0);
+    c->leg.sex = read_body(reader, leg, "leg", "side", parameter, count, &c->leg, &c->seed);
     c->leg.side = (sonde_limb_side)sonde_read_choice(reader, leg, "side", sonde_case_sides, 0);
   }
   if (!at || leg) return;
@@ -97,13 +96,9 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
     sonde_read_member(reader, at, "model", true, c->model, sizeof c->model);
     return;
   }
-  static const char *const MORE[] = {"seed", "sex", NULL};
-  uint32_t count;
   const sonde_parameter *parameter = sonde_thigh_parameters(&count);
-  read_parameters(reader, at, "thigh", MORE, parameter, count, &c->known);
   c->thigh = SONDE_CASE_GENERATED;
-  c->seed = sonde_read_integer(reader, at, "seed", 0, UINT32_MAX, 1);
-  c->known.sex = (sonde_sex)sonde_read_choice(reader, at, "sex", sonde_case_sexes, 0);
+  c->known.sex = read_body(reader, at, "thigh", NULL, parameter, count, &c->known, &c->seed);
 }
 
 // ---- pathology
