@@ -142,17 +142,6 @@ static sonde_status write_results(const paper *p, bool print, sonde_error *error
   return status;
 }
 
-static void print_claims(const paper *p, double seconds) {
-  uint32_t verdicts[PAPER_VERDICTS] = {0};
-  for (const paper_claim *c = p->claim; c < p->claim + p->claim_count; ++c) {
-    verdicts[c->verdict]++;
-    printf("%-13s  %s: %s\n", paper_verdict_text(c->verdict), c->id, c->found);
-  }
-  printf("%u claims: %u hold, %u in part, %u do not, %u not tried%s; wrote %s in %.0f s\n",
-         p->claim_count, verdicts[PAPER_HOLDS], verdicts[PAPER_IN_PART], verdicts[PAPER_FAILS],
-         verdicts[PAPER_OPEN], p->quick ? " (quick: small samples)" : "", p->directory, seconds);
-}
-
 static int run(void *from) {
   const options *o = from;
   assert(o->model && o->directory);
@@ -166,7 +155,17 @@ static int run(void *from) {
     status = work(p, &error);
   }
   if (!status) status = write_results(p, o->json, &error);
-  if (!status && !o->json) print_claims(p, app_seconds(CLOCK_MONOTONIC) - start);
+  if (!status && !o->json) {
+    const double seconds = app_seconds(CLOCK_MONOTONIC) - start;
+    uint32_t verdicts[PAPER_VERDICTS] = {0};
+    for (const paper_claim *c = p->claim; c < p->claim + p->claim_count; ++c) {
+      verdicts[c->verdict]++;
+      printf("%-13s  %s: %s\n", paper_verdict_text(c->verdict), c->id, c->found);
+    }
+    printf("%u claims: %u hold, %u in part, %u do not, %u not tried%s; wrote %s in %.0f s\n",
+           p->claim_count, verdicts[PAPER_HOLDS], verdicts[PAPER_IN_PART], verdicts[PAPER_FAILS],
+           verdicts[PAPER_OPEN], p->quick ? " (quick: small samples)" : "", p->directory, seconds);
+  }
   if (p) {
     sonde_fit_result_clear(&p->fit);
     sonde_site_table_clear(&p->sites);
