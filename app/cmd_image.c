@@ -149,21 +149,6 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
   return status;
 }
 
-static void other_vessels(const settled *s, bool json) {
-  if (json) app_json_object("branches");
-  for (int k = 2; k < (int)sonde_interior_vessel_count(s->interior); ++k) {
-    sonde_vessel_state v;
-    const char *name = sonde_interior_vessel_name(s->interior, k);
-    if (!sonde_interior_vessel_at_plane(s->interior, k, s->pose, &v)) continue;
-    if (json)
-      app_json_real(name, v.area_ratio);
-    else
-      printf("%s %.1f mm front to back, %.0f %% of its rest area\n", name, 2e3 * v.half_short_m,
-             100 * v.area_ratio);
-  }
-  if (json) app_json_close();
-}
-
 static int run(void *from) {
   const options *o = from;
   assert(o->out && o->size[0] > 0 && o->size[1] > 0);
@@ -209,7 +194,7 @@ static int run(void *from) {
       if (a)
         printf("artery %.1f mm front to back, %.0f %% of its rest area\n",
                2e3 * artery.half_short_m, 100 * artery.area_ratio);
-      other_vessels(&s, false);
+      settled_branches(&s, false);
     } else {
       app_json_begin();
       app_json("image:%s width_mm:%g height_mm:%g force_n:%g", o->out, image.width_m * 1e3,
@@ -219,7 +204,7 @@ static int run(void *from) {
           "case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
           o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
           a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
-      other_vessels(&s, true);
+      settled_branches(&s, true);
       app_json_end();
     }
   }

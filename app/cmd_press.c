@@ -101,6 +101,7 @@ static void print(const press *p, const options *o) {
     }
     app_json("vein_short_mm:%g residual:%g steps:%u",
              p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN, s->result.residual, s->iterations);
+    if (s->interior) settled_branches(s, true);
     settled_json_jumps(s);
     app_json("case:%s probe:%s site:%ld", p->pathology.name, s->probe.name, o->site);
     app_json_end();
@@ -112,7 +113,7 @@ static void print(const press *p, const options *o) {
   printf("residual      %8.1e of the contact force (%u steps)\n", s->result.residual,
          s->iterations);
   if (!p->cut[0])
-    printf("vein          not under the probe\n");
+    printf("vein          the femoral and popliteal vein are not under the probe\n");
   else
     printf("vein area     %8.1f %% of rest, %.1f mm front to back (%.2f of rest)\n",
            p->vessel[0].area_ratio * 100, p->vessel[0].half_short_m * 2e3,
@@ -124,6 +125,7 @@ static void print(const press *p, const options *o) {
       printf("closes        at a cuff of %.1f mmHg\n", p->closes_pa / PA_PER_MMHG);
   }
   if (p->cut[1]) printf("artery area   %8.1f %% of rest\n", p->vessel[1].area_ratio * 100);
+  if (s->interior) settled_branches(s, false);
   if (o->image) printf("image         %s\n", o->image);
 }
 

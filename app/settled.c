@@ -118,3 +118,18 @@ void settled_update(const settled *s, const sonde_pathology *pathology, double c
                                                 pathology, -1, tick, s->probe.half_x_m,
                                                 s->probe.half_y_m, cuff_pa, SONDE_POSTURE_SUPINE});
 }
+
+void settled_branches(const settled *s, bool json) {
+  if (json) app_json_object("branches");
+  for (int k = 2; k < (int)sonde_interior_vessel_count(s->interior); ++k) {
+    sonde_vessel_state v;
+    const char *name = sonde_interior_vessel_name(s->interior, k);
+    if (!sonde_interior_vessel_at_plane(s->interior, k, s->pose, &v)) continue;
+    if (json)
+      app_json_real(name, v.area_ratio);
+    else
+      printf("%s %.1f mm front to back, %.0f %% of its rest area\n", name, 2e3 * v.half_short_m,
+             100 * v.area_ratio);
+  }
+  if (json) app_json_close();
+}

@@ -44,4 +44,8 @@ void settled_json_jumps(const settled *s);
 void settled_update(const settled *s, const sonde_pathology *pathology, double cuff_pa,
                     uint64_t tick);
 
+// Branches that the image plane meets below the probe: a line for each, or a JSON object "branches"
+// of area ratios.
+void settled_branches(const settled *s, bool json);
+
 #endif
