@@ -56,7 +56,7 @@ async function press(page) {
     await held(page, depth);
     if (await page.evaluate(named)) break;
   }
-  await page.evaluate(() => window.sonde.setDepth(-4));
+  await page.evaluate(() => window.sonde.setDepth(-8));
   await until(page, (n) => window.sonde.exam.presses.length > n, before);
 }
 

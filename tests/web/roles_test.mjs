@@ -60,7 +60,7 @@ async function testTeacher(learner, teacher) {
   await role(teacher, "Give control back");
   await has(learner, true);
   check(await learner.evaluate(() => window.sonde.depth > 5), "the learner takes over where the teacher was");
-  await learner.evaluate(() => window.sonde.setDepth(-3));
+  await learner.evaluate(() => window.sonde.setDepth(-8));
 }
 
 async function comment(page, text) {

@@ -83,7 +83,7 @@ async function press(page, depth) {
   const before = (await exam(page)).presses.length;
   await page.evaluate((d) => window.sonde.setDepth(d), depth);
   await until(page, (d) => window.sonde.snapshot.penetration_mm > d - 2, depth);
-  await page.evaluate(() => window.sonde.setDepth(-4));
+  await page.evaluate(() => window.sonde.setDepth(-8));
   await until(page, (n) => window.sonde.exam.presses.length > n, before);
 }
 
@@ -95,10 +95,10 @@ async function apart(ada, bo, places) {
   check(first.exam !== second.exam && first.case !== second.case, "two learners, two exams, two cases");
   await goTo(ada);
   const still = await bo.evaluate(() => window.sonde.snapshot.position_mm);
-  await press(ada, 14);
+  await press(ada, 8);
   check((await bo.evaluate(() => window.sonde.snapshot.position_mm)).every((v, i) => Math.abs(v - still[i]) < 0.5), "one's probe moves, the other's stays");
-  await press(ada, 18);
-  await press(bo, 12);
+  await press(ada, 9);
+  await press(bo, 8);
   check((await exam(ada)).presses.length === 2 && (await exam(bo)).presses.length === 1, "presses are counted where they were made");
   const needed = (await exam(ada)).segments.find((s) => s.needed);
   await ada.locator("#segments [role=radio]", { hasText: needed.title }).click();

@@ -3,7 +3,7 @@
 import * as THREE from "three";
 import { add, length, sub, type Hold } from "./pose";
 import type { Site, Vec3 } from "./protocol";
-import type { ThighScene } from "./scene";
+import type { LegScene } from "./scene";
 
 const FAR_MM = 30;      // a click farther than this lifts the probe first
 const SITE_MM = 4;      // a click this near to a site goes to the site
@@ -36,7 +36,7 @@ export class Input {
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
-    private readonly scene: ThighScene,
+    private readonly scene: LegScene,
     private readonly hold: Hold,
     private readonly actions: InputActions,
   ) {

@@ -19,7 +19,7 @@ import { Rates } from "./rates";
 import { ReplayBar } from "./replay";
 import { ResultDialog } from "./result";
 import { Route } from "./route";
-import { ThighScene } from "./scene";
+import { LegScene } from "./scene";
 import { StartDialog } from "./start";
 import { EchoTools } from "./tools";
 import { Traces } from "./traces";
@@ -47,7 +47,7 @@ class App {
   pixels: Uint8Array = new Uint8Array(0);
   readonly hold = new Hold();
   private readonly route = new Route();
-  readonly scene = new ThighScene(find<HTMLCanvasElement>("scene"), query.get("quality") === "low");
+  readonly scene = new LegScene(find<HTMLCanvasElement>("scene"), query.get("quality") === "low");
   readonly echo = new EchoView(find("echo-box"), find<HTMLCanvasElement>("echo-marks"), find("echo-text"), find("measures"));
   readonly connection: Connection;
   private readonly plot = new ForcePlot(find("plot"));
@@ -69,7 +69,7 @@ class App {
   private pending: Frame | null = null;
   private goalDue = false;
   private curveKey = "";
-  private placed = false; // the hold of this thigh is chosen
+  private placed = false; // the hold of this leg is chosen
   private fresh = false; // a hello came, its controls not yet
   private offered = query.has("site"); // who names a site knows what he wants
   private lost = false; // since the last hello
@@ -371,7 +371,7 @@ class App {
     const own = exam !== null && phase !== "practice" && exam.title !== "";
     const played = phase === "replay" ? (this.replay?.title ?? "") : "";
     find("case-title").textContent = own ? exam.title : played || label(this.hello?.model ?? "");
-    find("case-history").textContent = own ? exam.history : played ? "" : "A simulated thigh, to practise on";
+    find("case-history").textContent = own ? exam.history : played ? "" : "A simulated leg, to practise on";
     find("case").title = find("case-history").textContent ?? "";
     this.showRole();
     const device = this.hello?.device ?? "page";
@@ -515,7 +515,7 @@ class App {
     const frame = this.pending;
     this.pending = null;
     if (frame) this.show(frame);
-    if (frame) this.connection.ack(frame.sequence); // before the thigh: image and force do not wait for it
+    if (frame) this.connection.ack(frame.sequence); // before the leg: image and force do not wait for it
     if (this.imaged) this.scene.render(); // its first picture takes long: the image goes before it
     this.imaged = this.frames > 0;
     this.nameTarget();

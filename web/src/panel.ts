@@ -158,12 +158,12 @@ export class Readouts {
 }
 
 const KEYS: [string, string][] = [
-  ["Drag on the thigh", "slides the probe along the skin; a far click lifts it and sets it down there"],
+  ["Drag on the leg", "slides the probe along the skin; a far click lifts it and sets it down there"],
   ["Wheel, two fingers, Up / Down, W / S", "press deeper or shallower by 1 mm, with Shift by 5 mm"],
   ["Right drag, hold Space, 0", "press progressively (Shift + Space lifts), let go"],
   ["A / D, Left / Right", "slide across or along the leg"],
   ["Q / E, T / G, Y / H", "rotate about the beam, tilt the beam"],
-  ["Drag beside the thigh", "turns the view; Ctrl + wheel zooms; X see through; R reset"],
+  ["Drag beside the leg", "turns the view; Ctrl + wheel zooms; X see through; R reset"],
   ["1 to 9, C", "choose the probe, next vein (free practice)"],
   ["F, M, O, B", "freeze; measure a distance, an area (Delete clears); compare with now"],
   ["P, V, Z", "patient's position, strain, gel (Shift + Z wipes)"],

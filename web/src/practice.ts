@@ -83,12 +83,12 @@ export class PatientTools {
 
   private buildTissue(): void {
     const box = find("tissue");
-    box.append(make("p", "caption", "Times this thigh's own values; 1 is the thigh as it is."));
+    box.append(make("p", "caption", "Times this leg's own values; 1 is the leg as it is."));
     for (const { key, name } of SCALES) {
       const row = make("label", "slider");
       const output = make("output", "", "1.00 ×");
       const input = make("input");
-      input.setAttribute("aria-label", `${name}, times this thigh's own`);
+      input.setAttribute("aria-label", `${name}, times this leg's own`);
       Object.assign(input, { type: "range", min: 0.5, max: 2, step: 0.05, value: 1 });
       input.oninput = () => {
         output.textContent = `${input.valueAsNumber.toFixed(2)} ×`;

@@ -20,7 +20,8 @@ const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to 
 const MOVED_ALPHA = 0.86;
 const CREASE_RAD = 0.6; // sharper edges are drawn sharp
 const SEEN_COSINE = 0.4; // between the view and the normal of a place: less is on the far side
-const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.85; // of the leg's length: what the camera looks at, and from how far
+const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.7; // of the leg's length: what the camera looks at, and from how far
+const FARTHEST_MM = 2000; // of the camera from the leg
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
 /** Skin: vertex colours with alpha; more opaque where it is seen at a grazing angle, like glass; where
@@ -75,7 +76,7 @@ interface SiteDot {
   rest: THREE.Vector3;
 }
 
-export class ThighScene {
+export class LegScene {
   skin: Skin | null = null;
   rangeChanged: (range_mm: number) => void = () => undefined;
   readonly orbit: OrbitControls;
@@ -158,9 +159,9 @@ export class ThighScene {
     this.orbit.enableDamping = false;
     this.orbit.enableZoom = false; // the wheel presses; Ctrl + wheel zooms (input.ts)
     this.orbit.mouseButtons = { LEFT: null, MIDDLE: THREE.MOUSE.ROTATE, RIGHT: null };
-    this.orbit.touches = { ONE: null, TWO: null }; // one finger beside the thigh turns (input.ts)
+    this.orbit.touches = { ONE: null, TWO: null }; // one finger beside the leg turns (input.ts)
     this.orbit.minDistance = 220;
-    this.orbit.maxDistance = 1400;
+    this.orbit.maxDistance = FARTHEST_MM;
     this.orbit.addEventListener("change", () => (this.dirty = true));
   }
 
@@ -168,7 +169,7 @@ export class ThighScene {
   private look(mesh: Mesh): void {
     let low = Infinity, high = -Infinity;
     for (let i = 2; i < mesh.points.length; i += 3) (low = Math.min(low, mesh.points[i]!)), (high = Math.max(high, mesh.points[i]!));
-    const middle = low + MIDDLE_SHARE * (high - low), away = Math.min(1400, AWAY_SHARE * (high - low));
+    const middle = low + MIDDLE_SHARE * (high - low), away = Math.min(FARTHEST_MM, AWAY_SHARE * (high - low));
     const other = Math.abs(away - this.away_mm) > 0.3 * this.away_mm;
     (this.middle_mm = middle), (this.away_mm = away);
     if (other) this.home();
@@ -185,7 +186,7 @@ export class ThighScene {
 
   zoom(factor: number): void {
     const offset = this.camera.position.clone().sub(this.orbit.target);
-    offset.setLength(Math.min(1400, Math.max(220, offset.length() * factor)));
+    offset.setLength(Math.min(FARTHEST_MM, Math.max(220, offset.length() * factor)));
     this.camera.position.copy(this.orbit.target).add(offset);
     this.orbit.update();
     this.dirty = true;
@@ -238,12 +239,12 @@ export class ThighScene {
 
   private setSkin(mesh: Mesh): void {
     this.skin = new Skin(mesh.points.slice(), mesh.faces);
-    this.restMesh = new THREE.Mesh(ThighScene.geometry(mesh));
+    this.restMesh = new THREE.Mesh(LegScene.geometry(mesh));
     for (const part of this.vessels.keys()) this.inside.getObjectByName(`vessel ${part}`)?.removeFromParent();
     this.vessels.clear();
     this.frame = null;
     this.look(mesh);
-    const g = ThighScene.geometry(mesh);
+    const g = LegScene.geometry(mesh);
     const colours = new Float32Array((mesh.points.length / 3) * 4).fill(CALM_ALPHA);
     for (let i = 0; i < colours.length; i += 4) colours.set(SHADE_TABLE.subarray(0, 3), i);
     g.setAttribute("color", new THREE.BufferAttribute(colours, 4));
@@ -271,7 +272,7 @@ export class ThighScene {
 
   private setFemur(mesh: Mesh): void {
     const material = new THREE.MeshStandardMaterial({ color: COLOUR.bone, roughness: 0.9 });
-    this.replaceInside("femur", new THREE.Mesh(toCreasedNormals(ThighScene.geometry(mesh), CREASE_RAD), material));
+    this.replaceInside("femur", new THREE.Mesh(toCreasedNormals(LegScene.geometry(mesh), CREASE_RAD), material));
   }
 
   private setVessel(line: Line): void {
@@ -282,6 +283,7 @@ export class ThighScene {
       radius += line.points[i + 3]!;
     }
     if (points.length < 2) return;
+    if (line.part === PART.vein) this.sides.veinAt(points[0]!.x);
     const vein = line.part === PART.vein || (line.part >= PART.branch && line.part % 2 === 0);
     const branch = line.part >= PART.branch;
     this.vessels.set(line.part, { points: line.points.slice(), vein });
@@ -294,7 +296,7 @@ export class ThighScene {
   private setProbeBody(mesh: Mesh): void {
     const points = mesh.points.slice();
     for (let i = 2; i < points.length; i += 3) points[i] = Math.max(points[i]!, -BEHIND_MM);
-    const g = toCreasedNormals(ThighScene.geometry({ ...mesh, points }), CREASE_RAD);
+    const g = toCreasedNormals(LegScene.geometry({ ...mesh, points }), CREASE_RAD);
     const round = mesh.faces.length > 3 * 60;
     const material = new THREE.MeshStandardMaterial({ color: COLOUR.probe, roughness: 0.5, transparent: true, opacity: 0.5 });
     const body = new THREE.Mesh(g, material);

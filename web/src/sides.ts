@@ -1,4 +1,4 @@
-// Names of the thigh's ends and sides, in the picture of the thigh.
+// Names of the leg's ends and sides, in the picture of the leg.
 
 import * as THREE from "three";
 
@@ -6,7 +6,9 @@ const HEIGHT_PX = 44; // of the drawn letters; shown at a third
 const SIZE = 0.032; // of the picture's height
 const AWAY_MM = 14; // from the skin
 const END_MM = 15; // of the leg that belongs to an end
+const THIGH_MM = 500; // a longer leg goes on below the knee
 const INK = "#c9d6e4";
+const INNER = "inner side", OUTER = "outer side";
 
 function words(text: string): THREE.Sprite {
   const canvas = document.createElement("canvas");
@@ -38,20 +40,21 @@ function topNear(points: Float32Array, end_z: number): number {
   return top;
 }
 
-/** x points to the inner side, y to the front, z from the groin to the knee. */
+/** y points to the front, z from the groin down; x to the inner side of a right leg, the outer one of a left. */
 export class Sides {
   readonly group = new THREE.Group();
   private middle_x = 0;
+  private half_x = 0;
 
-  /** Around a thigh with these skin points, mm. */
+  /** Around a leg with these skin points, mm; a right one until its vein is known. */
   place(points: Float32Array): void {
     const box = new THREE.Box3().setFromArray(points);
     const middle = box.getCenter(new THREE.Vector3());
     const at: [string, number, number, number, number][] = [
       ["Groin", middle.x, topNear(points, box.min.z) + AWAY_MM, box.min.z, 0],
-      ["Knee", middle.x, topNear(points, box.max.z) + AWAY_MM, box.max.z, 0],
-      ["inner side", box.max.x + AWAY_MM, middle.y, middle.z, 1],
-      ["outer side", box.min.x - AWAY_MM, middle.y, middle.z, -1],
+      [box.max.z - box.min.z > THIGH_MM ? "Ankle" : "Knee", middle.x, topNear(points, box.max.z) + AWAY_MM, box.max.z, 0],
+      [INNER, 0, middle.y, middle.z, 1],
+      [OUTER, 0, middle.y, middle.z, -1],
     ];
     this.group.clear();
     for (const [text, x, y, z, side] of at) {
@@ -61,6 +64,18 @@ export class Sides {
       this.group.add(sprite);
     }
     this.middle_x = middle.x;
+    this.half_x = box.max.x - middle.x + AWAY_MM;
+    this.veinAt(Infinity);
+  }
+
+  /** The vein enters the leg on its inner side: its x there, mm. */
+  veinAt(x: number): void {
+    const inner = x < this.middle_x ? -1 : 1;
+    for (const sprite of this.group.children) {
+      const side = sprite.name === INNER ? inner : sprite.name === OUTER ? -inner : 0;
+      sprite.userData.side = side;
+      if (side !== 0) sprite.position.x = this.middle_x + side * this.half_x;
+    }
   }
 
   /** A side is named where the viewer sees it, not through the leg. */
