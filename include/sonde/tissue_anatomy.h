@@ -105,6 +105,8 @@ typedef struct sonde_map_seed {
   uint32_t section;     /**< compartment; a septum parts two of them */
   bool muscle;          /**< false: fat between muscles */
   sonde_vec3 fibre;     /**< unit, along the belly's fibres */
+  sonde_vec3 grain;     /**< the same where the muscle is thickest, one direction for a cell */
+  sonde_vec3 out;       /**< unit, from the limb's axis to that place */
   double pennation_rad; /**< between fibres and belly */
 } sonde_map_seed;
 

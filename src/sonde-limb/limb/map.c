@@ -97,8 +97,22 @@ static sonde_map_seed seed_facts(const void *self, uint32_t seed, sonde_vec3 res
   sonde_map_seed facts = {.cell = cell.cell,
                           .section = (uint32_t)limb_cell_compartment(cell.cell),
                           .muscle = cell.cell < SONDE_LIMB_MUSCLES,
-                          .fibre = vec3(0, 0, 1)};
+                          .fibre = vec3(0, 0, 1),
+                          .grain = vec3(0, 0, 1),
+                          .out = vec3(1, 0, 0)};
   if (!facts.muscle) return facts;
+  // The first seed of the cell in the row in which the muscle is thickest.
+  limb_cell thick = {.cell = cell.cell, .seed = seed};
+  while (thick.seed > 0 && m->cell_of[thick.seed - 1] == cell.cell) --thick.seed;
+  for (uint32_t row = 0; row + 1 < LIMB_CELL_ROWS; ++row)
+    if (m->area[row][cell.cell] > m->area[thick.row][cell.cell]) thick.row = row;
+  const limb_seed *at = &m->seed[thick.row][thick.seed];
+  const double level = LIMB_TOP + thick.row * LIMB_CELL_STEP;
+  const sonde_vec3 c = limb_centre(limb, level),
+                   beside = v_scale(vec3((double)at->x, (double)at->y, 0), m->radius[thick.row]);
+  sonde_vec3 grain = limb_fibre(limb, &thick, v_add(vec3(c.x, c.y, limb_z(limb, level)), beside));
+  facts.grain = limb_side_point(limb, vec3(grain.x, grain.y, -grain.z));
+  facts.out = limb_side_point(limb, v_unit(beside, vec3(1, 0, 0)));
   sonde_vec3 fibre = limb_fibre(limb, &cell, in_limb(limb, rest));
   facts.fibre = limb_side_point(limb, vec3(fibre.x, fibre.y, -fibre.z));
   facts.pennation_rad = limb_muscle_table[cell.cell].pennation_deg * SONDE_PI / 180;

@@ -97,6 +97,8 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->flat_envelope, image);
   CARVE(echo->grey, image);
   CARVE(echo->noise, SONDE_NOISE);
+  const size_t side = SONDE_TILE_SIDE;
+  for (int k = 0; k < SONDE_TILES; ++k) CARVE(echo->tile[k], side * side * side);
   CARVE(echo->cubes, 1);
   CARVE(echo->bands, 1);
   CARVE(echo->motion, 1);
@@ -159,6 +161,10 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
   made->seen = SONDE_NEW(uint64_t, SONDE_BOX_CUBES / 64);
   if (!made->block || !made->psf || !made->spare || !made->node || !made->plane || !made->air ||
       !made->sheet || !made->first_sheet || !made->seen) {
+    sonde_echo_destroy(made);
+    return sonde_fail_memory(error);
+  }
+  if (!sonde_tiles_draw(made->tile[0], made->tile[1])) {
     sonde_echo_destroy(made);
     return sonde_fail_memory(error);
   }

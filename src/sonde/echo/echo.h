@@ -83,6 +83,7 @@ struct sonde_echo {
   // [POOL + LOOSE + POOL] sorted by z within each cube's share; then unsorted ones for pieces; then
   // the shares again, each in the order of its parts: a quarter, a quarter, a half.
   scatter_pool pool;
+  uint32_t *tile[SONDE_TILES]; // [TILE_SIDE^3] of fat and muscle (tiles.c)
   scatter_pool blood; // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
   float *noise;       // [NOISE]
 
@@ -119,6 +120,7 @@ struct sonde_echo {
   float line_share[SONDE_MOST_LINES];    // distance to the next, columns
   float *wide;                           // [2][fields][padded] two coarse rows, per line
   float *row;                            // [fields][padded], one row of the march
+  float wall_m[MOST_VESSELS];            // of those shown
   float *level[2];                       // [levels][padded] of this row and the last
   float *knots;                  // [padded][TEXTURES][KNOT_FLOATS] of the textures, kernel.h
   float *scatter, *loss, *rough; // [padded] of this row
@@ -151,6 +153,8 @@ struct sonde_echo {
 
 // Tables of scatterers, streamlines and noise of a new renderer.
 void sonde_scatterers_draw(sonde_echo *echo);
+// Amplitudes of fat and muscle, [TILE_SIDE^3] each; false: no memory.
+bool sonde_tiles_draw(uint32_t *fat, uint32_t *muscle);
 // Lines, samples and focus from what the operator sets; the key of the beam they need.
 void sonde_echo_geometry(sonde_echo *echo, double aperture_m, const sonde_echo_settings *settings);
 beam_key sonde_echo_key(const frame *f);

@@ -10,15 +10,28 @@
 
 enum {
   SONDE_MOST_LINES = 512,
-  ECHO_ALIGN = 16,  // lines and batches are padded to whole vectors
-  LAYER_LEVELS = 4, // skin, dermis, fascia, cortex; the vessels' walls and the lesions follow
+  ECHO_ALIGN = 16, // lines and batches are padded to whole vectors
+  // Skin, dermis, deep fascia, cortex, superficial fascia; the vessels' walls and the lesions
+  // follow.
+  LAYER_LEVELS = 5,
   TEXTURES = 14,    // one more than the last texture's salt
   KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
   SONDE_FINE = 2, // columns of the grid per scan line
-  AXIAL_MOST = 4, // samples summed at once
+  SONDE_TILE_SIDE = 64,
+  SONDE_TILES = 2, // fat, muscle
+  AXIAL_MOST = 4,  // samples summed at once
 };
+
+// Of a tile: x of the voxels that a step along z moves the pattern by, so that a plane through it
+// does not meet the same place one period deeper; bytes per unit of amplitude.
+#define SONDE_TILE_SHEAR 0.375f
+#define SONDE_TILE_STEPS 42.0f
+
+// Layers of a deep fascia, m below its upper face, and the double echo of an artery's wall.
+enum { FASCIA_SHEETS = 3 };
+static const float fascia_sheet_m[FASCIA_SHEETS] = {0, 0.35e-3f, 0.75e-3f};
 
 // A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest, and of the
 // length along the vessel, m. A mural clot fills what lies beyond its free surface on the far side.
@@ -140,6 +153,7 @@ typedef struct axial_job {
 // What a vessel in view is made of.
 typedef struct tissue_vessel {
   float wall_m, clot_fraction, clot_scatter;
+  float sheath_m;            // of bright fat around it; 0: none
   float clot_loss;           // dB/m/MHz one way
   float lumps_db, layers_db; // unevenness of the clot
   uint32_t number;           // among the leg's vessels
@@ -158,11 +172,16 @@ typedef struct tissue_cell {
   float x_mm, y_mm; // in the section
   float cell;       // number: seeds of one cell have no boundary
   float section;    // number of the compartment: a septum parts two
-  float muscle;     // 1, or 0: fat
-  float lean;       // of the fibres: depth per length along the leg
-  float turn;       // shift of the texture, so that neighbours differ
-  float gain;       // of the backscatter
 } tissue_cell;
+
+// Facts of the cells that points look up by the cell's place, a row each.
+typedef enum cell_fact {
+  CELL_MUSCLE, // 1, or 0: fat
+  CELL_GAIN,   // of the backscatter
+  CELL_FACING, // how squarely the beam meets the sheets between bundles, 0..1
+  CELL_VOXEL,  // voxel of the muscle's tile = [3] constant + [9] coefficients of across, up, s
+  CELL_FACTS = CELL_VOXEL + 12
+} cell_fact;
 
 // A row of the coarse plane, per line.
 typedef struct widen_job {
@@ -182,9 +201,11 @@ typedef struct tissue_job {
   tissue_lesion lesion[MOST_LESIONS];
   uint32_t cells; // 0: the layers alone
   tissue_cell cell[MOST_CELLS];
-  float beam_x, beam_y;      // direction of the beam in the section
-  float bone_radius_m;       // of the cylinder about the leg's axis
-  float webs, oedema;        // 0..1
+  float fact[CELL_FACTS][MOST_CELLS];
+  const uint32_t *tile[SONDE_TILES]; // [SIDE][SIDE][SIDE], kernel_texture.h
+  float beam_x, beam_y;              // direction of the beam in the section
+  float bone_radius_m;               // of the cylinder about the leg's axis
+  float webs, oedema;                // 0..1
   float rough_bone, rough_m; // amplitude over muscle on a level cortex, fading over so far from it
   float rows_per_m;          // of the march, 0 in its first row
   bool plain;

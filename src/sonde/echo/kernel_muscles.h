@@ -5,28 +5,37 @@
 
 #include "base/base.h"
 #include "echo/kernel.h"
+#include "echo/kernel_texture.h"
 
 // Epimysium and septa: half thickness, m, and brightness when the beam meets them squarely.
 static const float epimysium_m = 0.45e-3f, septum_m = 0.7e-3f;
-static const float epimysium_scatter = 1.3f, septum_scatter = 2.2f, grazing = 0.25f;
+static const float epimysium_scatter = 1.6f, septum_scatter = 2.6f, grazing = 0.2f;
 
 // The muscle that a point belongs to, and what parts it from the next one.
 typedef struct muscle_place {
-  floats muscle, lean, turn, gain; // of the cell
-  floats bright;                   // of its boundary there
+  ints which;    // of the cells
+  floats bright; // of its boundary there
 } muscle_place;
 
+// Boundaries wind by so many mm.
+static const float winding_mm = 0.7f;
+
 // A point lies in the cell whose seed has the least power there. The boundary with the cell of the
-// next power is half the difference of both powers over the distance of both seeds away.
-INLINE muscle_place place_in_muscles(const tissue_job *job, const float *field) {
+// next power is half the difference of both powers over the distance of both seeds away. A step d
+// of the point adds -2 d.c to the power of a seed at c, apart from what it adds to all.
+INLINE muscle_place place_in_muscles(const tissue_job *job, knots *memory, const float *field,
+                                     floats theta, floats s, floats depth) {
   const uint32_t n = job->lines;
   floats least = vset(1e30f), next = vset(1e30f), cell = vset(-1);
   floats x = vset(0), y = vset(0), next_x = vset(0), next_y = vset(0);
   floats section = vset(0), next_section = vset(0);
-  muscle_place at = {vset(1), vset(0), vset(0), vset(1), vset(0)};
+  floats wind_x = texture(memory, theta, s * 120, depth * 220, TURNS_FAT, 2);
+  floats wind_y = texture(memory, theta, s * 140, depth * 250, TURNS_FAT, 3);
+  wind_x = wind_x * (-2 * winding_mm), wind_y = wind_y * (-2 * winding_mm);
+  muscle_place at = {vset_ints(0), vset(0)};
   for (uint32_t k = 0; k < job->cells; ++k) {
     const tissue_cell *c = &job->cell[k];
-    const floats power = vload(field + k * n);
+    const floats power = vload(field + k * n) + (wind_x * c->x_mm + wind_y * c->y_mm);
     const ints own = cell == c->cell, first = power < least;
     // When this seed has the least power so far, the cell that had it before becomes the next one.
     const ints pushed = first & ~own, second = ~first & ~own & (power < next);
@@ -38,20 +47,38 @@ INLINE muscle_place place_in_muscles(const tissue_job *job, const float *field) 
     least = vselect(first, power, least), cell = vselect(first, vset(c->cell), cell);
     x = vselect(first, vset(c->x_mm), x), y = vselect(first, vset(c->y_mm), y);
     section = vselect(first, vset(c->section), section);
-    at.muscle = vselect(first, vset(c->muscle), at.muscle);
-    at.lean = vselect(first, vset(c->lean), at.lean);
-    at.turn = vselect(first, vset(c->turn), at.turn);
-    at.gain = vselect(first, vset(c->gain), at.gain);
+    at.which = vselect(first, vset_ints((int32_t)k), at.which);
   }
   floats dx = x - next_x, dy = y - next_y, apart = vsqrt(dx * dx + dy * dy) + 1e-3f;
   floats away = (next - least) * 0.5e-3f / apart; // m
   ints septum = section != next_section;
-  floats half = vselect(septum, vset(septum_m), vset(epimysium_m));
+  floats patch = texture(memory, theta, s * 160, depth * 400, 2 * TURNS_FAT, 5);
+  floats half = vselect(septum, vset(septum_m), vset(epimysium_m)) * (1 + 0.5f * patch);
   floats height = vmax(1 - away / half, vset(0));
   floats square = (dx * job->beam_x + dy * job->beam_y) / apart;
   floats facing = grazing + (1 - grazing) * square * square;
-  at.bright = height * facing * vselect(septum, vset(septum_scatter), vset(epimysium_scatter));
+  at.bright = height * facing * (0.75f + 0.7f * patch) *
+              vselect(septum, vset(septum_scatter), vset(epimysium_scatter));
   return at;
+}
+
+// A fact of each lane's cell. Most vectors lie in one cell.
+INLINE floats cell_fact_at(const tissue_job *job, cell_fact which, ints cell, bool one) {
+  return one ? vset(job->fact[which][cell[0]]) : vgather(job->fact[which], cell);
+}
+
+// Muscle's tile along the fibres of each lane's cell.
+INLINE tile_grain muscle_grain(const tissue_job *job, ints cell, bool one, floats across, floats up,
+                               floats s) {
+  floats voxel[3];
+  for (int c = 0; c < 3; ++c) {
+    const cell_fact of = (cell_fact)(CELL_VOXEL + 3 + 3 * c);
+    voxel[c] = cell_fact_at(job, (cell_fact)(CELL_VOXEL + c), cell, one) +
+               cell_fact_at(job, of, cell, one) * across +
+               cell_fact_at(job, (cell_fact)(of + 1), cell, one) * up +
+               cell_fact_at(job, (cell_fact)(of + 2), cell, one) * s;
+  }
+  return tile_at(job->tile[1], voxel[0], voxel[1], voxel[2]);
 }
 
 #endif

@@ -88,11 +88,40 @@ INLINE floats sheet(floats layer, float share) {
   return height * height;
 }
 
-// Septa of the fat: broken sheets roughly along the skin, bent by the lobules.
-INLINE floats septa(knots *memory, floats theta, floats s, floats depth) {
-  floats bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);
-  floats strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 4);
-  return vmax(sheet(depth * 420 + 1.3f * bend, 0.30f) * (0.55f + strength), vset(0));
+// Amplitudes of a tile's voxel: of sheets when the beam meets them squarely, of all else there.
+typedef struct tile_grain {
+  floats facing, body;
+} tile_grain;
+
+// Both amplitudes of a voxel and of the next one along x.
+INLINE tile_grain tile_pair(const uint32_t *tile, ints at, floats t) {
+  ints w = (ints)vgather((const float *)(const void *)tile, at);
+  floats a = vreal(w & 255), b = vreal((w >> 16) & 255);
+  return (tile_grain){a + t * (vreal((w >> 8) & 255) - a), b + t * (vreal((w >> 24) & 255) - b)};
+}
+
+// A tile at a place in voxels, periodic.
+INLINE tile_grain tile_at(const uint32_t *tile, floats x, floats y, floats z) {
+  enum { SIDE = SONDE_TILE_SIDE, LAST = SIDE - 1 };
+  x -= SONDE_TILE_SHEAR * z;
+  floats fx = vfloor(x), fy = vfloor(y), fz = vfloor(z);
+  ints i = vint(fx) & LAST, j = vint(fy), k = vint(fz);
+  ints j0 = (j & LAST) * SIDE + i, j1 = ((j + 1) & LAST) * SIDE + i;
+  ints k0 = (k & LAST) * (SIDE * SIDE), k1 = ((k + 1) & LAST) * (SIDE * SIDE);
+  floats tx = x - fx, ty = y - fy, tz = z - fz;
+  tile_grain p = tile_pair(tile, k0 + j0, tx), q = tile_pair(tile, k0 + j1, tx);
+  tile_grain r = tile_pair(tile, k1 + j0, tx), s = tile_pair(tile, k1 + j1, tx);
+  p.facing += ty * (q.facing - p.facing), p.body += ty * (q.body - p.body);
+  r.facing += ty * (s.facing - r.facing), r.body += ty * (s.body - r.body);
+  const float unit = 1 / SONDE_TILE_STEPS;
+  return (tile_grain){unit * (p.facing + tz * (r.facing - p.facing)),
+                      unit * (p.body + tz * (r.body - p.body))};
+}
+
+// Fat's tile by angle, length and depth: 15 tiles around the leg, of 32 mm along it and 16 mm down.
+INLINE tile_grain fat_grain(const uint32_t *tile, floats theta, floats s, floats depth) {
+  const float around = 15 * SONDE_TILE_SIDE * 0.159154943f;
+  return tile_at(tile, theta * around, s * 2000, depth * 4000);
 }
 
 // Oedema: fluid in clefts around lobules of 6 by 8 mm, 0..1.
@@ -111,17 +140,6 @@ INLINE floats webs(knots *memory, floats theta, floats s, floats depth, floats a
   floats bend = texture(memory, theta, s * 90, depth * 400, 2 * TURNS_FAT, 9);
   floats strength = texture(memory, theta, s * 110, depth * 500, 2 * TURNS_FAT, 10);
   return 2.6f * sheet(along * 1.2f + 0.7f * bend, 0.4f) * (0.8f + 0.6f * strength);
-}
-
-// Bundles of muscle, in decibels: dark fascicles between short bright connective streaks that run
-// at a small angle to the skin and far along the leg.
-INLINE floats bundles(knots *memory, floats theta, floats s, floats depth) {
-  floats slant = depth + 0.012f * theta;
-  floats bend = texture(memory, theta, s * 40, depth * 130, TURNS_MUSCLE / 3, 2);
-  floats fine = texture(memory, theta, s * 90, slant * 900, TURNS_MUSCLE, 3);
-  floats strength = texture(memory, theta, s * 60, slant * 700, TURNS_MUSCLE, 5);
-  floats bright = sheet(slant * 420 + 1.4f * bend, 0.5f) * (0.2f + strength);
-  return 2.5f * fine + 3.5f * bend + 19 * vmax(bright, vset(0)) - 5;
 }
 
 // Connective tissue within half a millimetre of the fascia.

@@ -18,14 +18,17 @@ static const float clutter_power = 0.02f, clutter_m = 5e-3f;
 typedef struct interface {
   float db, loss_db;
 } interface;
-enum { CORTEX = 3 };
+enum { FASCIA = 2, CORTEX = 3, SUPERFICIAL = 4 };
 static const interface interfaces[LAYER_LEVELS] = {
     {18, 0},  // skin
     {10, 0},  // dermis and fat
     {21, 0},  // fascia
     {36, 55}, // cortex
+    {14, 0},  // superficial fascia
 };
-static const interface vessel_wall = {20, 0};
+static const interface vessel_wall[2] = {{14, 0}, {17, 0}}; // vein, artery
+// Of the deeper sheets of a fascia and of the outer face of an artery's wall, over the first one.
+static const float next_sheet_db = -3;
 static const interface lesion_edges[SONDE_LESION_KINDS] = {
     {9, 0},  // capsule of a node
     {15, 0}, // cyst
@@ -35,6 +38,9 @@ static const interface lesion_edges[SONDE_LESION_KINDS] = {
 // thick they lie on it.
 static const float rough_share = 0.3f, rough_m = 0.4e-3f;
 static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
+
+// Fat around a vessel between muscles, of its radius and at most.
+static const float sheath_share = 0.5f, most_sheath_m = 2e-3f;
 
 static const uint32_t lesion_salt = 22; // of the first lesion; far branches have the same ones
 enum { CELL_SALT = 97 };
@@ -63,6 +69,7 @@ static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt) {
 
 // Layers end at vessels and lesions, lesions at vessels, and branches open into their parents.
 static bool is_hidden(const sonde_echo *echo, const float *now, uint32_t l, uint32_t level) {
+  if (level == SUPERFICIAL && !(now[FASCIA * echo->padded + l] < 0)) return true;
   const uint32_t n = echo->padded, walls = LAYER_LEVELS, edges = walls + echo->shown_count;
   if (level == 0 || level == CORTEX) return false;
   for (uint32_t k = walls; k < edges; ++k) {
@@ -81,11 +88,34 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
   const sonde_lesion *lesion = echo->interior->findings.lesion;
   const float *now = echo->level[row % 2], *before = echo->level[(row + 1) % 2];
   const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  // The sheets: which level they lie at, and how far beyond its change of sign.
+  struct {
+    uint32_t level, sheet;
+    float beyond_m;
+  } sheet[MOST_LEVELS + FASCIA_SHEETS + MOST_VESSELS];
+  uint32_t sheets = 0;
+  for (uint32_t which = 0; which < echo->levels; ++which) {
+    uint32_t count = which == FASCIA && !echo->plain ? FASCIA_SHEETS : 1;
+    const bool wall = which >= LAYER_LEVELS && which < edges;
+    const sonde_interior *in = echo->interior;
+    if (wall && !echo->plain &&
+        in->course[echo->shown[which - LAYER_LEVELS]].kind == SONDE_VESSEL_ARTERY)
+      count = 2;
+    for (uint32_t k = 0; k < count; ++k) {
+      sheet[sheets].level = which, sheet[sheets].sheet = k;
+      sheet[sheets].beyond_m =
+          wall ? (float)k * echo->wall_m[which - LAYER_LEVELS] : fascia_sheet_m[k];
+      ++sheets;
+    }
+  }
   for (uint32_t l = 0; l < echo->lines; ++l) {
     if (!crossed[l / ECHO_ALIGN] || echo->air[l]) continue;
-    for (uint32_t which = 0; which < echo->levels; ++which) {
-      const float *level = now + which * n, last = before[which * n + l];
-      if ((last < 0) == (level[l] < 0) || is_hidden(echo, now, l, which)) continue;
+    for (uint32_t i = 0; i < sheets; ++i) {
+      const uint32_t which = sheet[i].level;
+      const float *level = now + which * n;
+      const float last = before[which * n + l] - sheet[i].beyond_m;
+      const float here = level[l] - sheet[i].beyond_m;
+      if ((last < 0) == (here < 0) || is_hidden(echo, now, l, which)) continue;
       // What reflects, and the salt of its roughness: it stays whatever else is in view.
       const interface *kind = &interfaces[which % LAYER_LEVELS];
       uint32_t salt = which;
@@ -93,14 +123,16 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
         const uint32_t number = echo->lesion[which - edges];
         kind = &lesion_edges[lesion[number].kind], salt = lesion_salt + number;
       } else if (which >= LAYER_LEVELS) {
-        kind = &vessel_wall, salt = LAYER_LEVELS + echo->shown[which - LAYER_LEVELS];
+        const uint32_t number = echo->shown[which - LAYER_LEVELS];
+        kind = &vessel_wall[echo->interior->course[number].kind], salt = LAYER_LEVELS + number;
       }
       // Where between the rows, and how much deeper from column to column.
       uint32_t left = l > 0 ? l - 1 : l, right = l + 1 < echo->lines ? l + 1 : l;
-      float t = last / (last - level[l]), slope = (level[l] - last) / dz;
+      float t = last / (last - here), slope = (here - last) / dz;
       float across = (level[right] - level[left]) / (float)(right - left);
       float rise = -across / (SONDE_FINE * (fabsf(slope) > 1e-6f ? slope : 1e-6f));
-      float rough = echo->plain ? 0 : 4 * roughness(echo, l, salt);
+      float rough = echo->plain ? 0 : 4 * roughness(echo, l, salt + 64 * sheet[i].sheet);
+      if (sheet[i].sheet > 0) rough = 2.5f * rough + (float)sheet[i].sheet * next_sheet_db;
       float amplitude = echo->coupling[l] * amplitude_of_db(kind->db + rough - echo->loss_db[l]);
       sonde_sheet_add(echo, l, ((float)row - 1 + t) * dz, rise, amplitude);
       echo->loss_db[l] += kind->loss_db;
@@ -153,7 +185,7 @@ static void store_gain(sonde_echo *echo, uint32_t row) {
 }
 
 // Materials of what is in view.
-static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
+static void describe_tissue(sonde_echo *echo, tissue_job *job) {
   const sonde_interior *in = echo->interior;
   job->vessels = echo->shown_count, job->lesions = echo->lesion_count;
   job->webs = (float)in->findings.webs, job->oedema = (float)in->findings.oedema;
@@ -164,11 +196,14 @@ static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
     const uint32_t which = echo->shown[k];
     const sonde_pathology *p = sonde_echo_pathology(echo, which);
     float wall = wall_m[in->course[which].kind];
-    if (which >= 2) wall = fminf(wall, thin_wall * (float)in->section[which][0].radius_m);
+    const float radius = (float)in->section[which][0].radius_m;
+    if (which >= 2) wall = fminf(wall, thin_wall * radius);
+    echo->wall_m[k] = wall;
     float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
     bool vein = in->course[which].kind == SONDE_VESSEL_VEIN;
     job->vessel[k] =
         (tissue_vessel){.wall_m = wall,
+                        .sheath_m = echo->plain ? 0 : fminf(sheath_share * radius, most_sheath_m),
                         .clot_fraction = vein ? (float)p->thrombus_fraction : 0,
                         .clot_scatter = amplitude_of_db(fresh_db + db_per_echogenicity * more),
                         .clot_loss = 18 + 40 * age,
@@ -196,17 +231,26 @@ static void describe_tissue(const sonde_echo *echo, tissue_job *job) {
     job->beam_x = (float)(beam.x / flat), job->beam_y = (float)(beam.y / flat);
     for (uint32_t k = 0; k < job->cells; ++k) {
       const sonde_map_seed seed = map->seed(map->self, echo->cell[k], look);
-      const double down = fabs(seed.fibre.z) > 0.3 ? seed.fibre.z : 0.3;
       const float own = knot((int32_t)seed.cell, 0, CELL_SALT);
-      job->cell[k] =
-          (tissue_cell){.x_mm = (float)(1e3 * at[k].x),
-                        .y_mm = (float)(1e3 * at[k].y),
-                        .cell = (float)seed.cell,
-                        .section = (float)seed.section,
-                        .muscle = seed.muscle ? 1 : 0,
-                        .lean = (float)((seed.fibre.x * beam.x + seed.fibre.y * beam.y) / down),
-                        .turn = 0.013f * own,
-                        .gain = amplitude_of_db(most_cell_db * own)};
+      job->cell[k] = (tissue_cell){.x_mm = (float)(1e3 * at[k].x),
+                                   .y_mm = (float)(1e3 * at[k].y),
+                                   .cell = (float)seed.cell,
+                                   .section = (float)seed.section};
+      // Axes of the tile: z across the fibres and away from the bone, y along them. Each cell
+      // starts elsewhere in the tile.
+      const sonde_vec3 fibre = seed.grain, out = seed.out;
+      const sonde_vec3 deep = v_unit(v_madd(out, -v_dot(out, fibre), fibre), vec3(1, 0, 0));
+      const sonde_vec3 axis[3] = {v_cross(fibre, deep), fibre, deep};
+      static const double per_m[3] = {1 / 0.3e-3, 1 / 0.8e-3, 1 / 0.25e-3};
+      for (int c = 0; c < 3; ++c) {
+        const sonde_vec3 row = v_scale(axis[c], per_m[c]);
+        job->fact[CELL_VOXEL + c][k] = 32 * (1 + knot((int32_t)seed.cell, c + 1, CELL_SALT));
+        for (int d = 0; d < 3; ++d)
+          job->fact[CELL_VOXEL + 3 + 3 * c + d][k] = (float)v_coordinate(row, d);
+      }
+      job->fact[CELL_MUSCLE][k] = seed.muscle ? 1 : 0;
+      job->fact[CELL_GAIN][k] = amplitude_of_db(most_cell_db * own);
+      job->fact[CELL_FACING][k] = (float)fabs(v_dot(deep, beam));
     }
   }
   // Facets of the cortex lie thinner than the pulse is long, which they fill only in part. The
@@ -230,6 +274,7 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .bone_radius_m = (float)echo->interior->bone_radius_m,
                     .plain = echo->plain,
                     .memory = echo->knots,
+                    .tile = {echo->tile[0], echo->tile[1]},
                     .scatter = echo->scatter,
                     .loss = echo->loss,
                     .rough = echo->rough,
