@@ -1,6 +1,7 @@
 // sonde image: one echographic picture of a model, at any pose.
 #include "image_findings.h"
 #include "options.h"
+#include "scanner_choice.h"
 #include "settled.h"
 
 #include <assert.h>
@@ -9,7 +10,7 @@
 #include <string.h>
 
 typedef struct options {
-  const char *model, *probe, *pathology, *out;
+  const char *model, *probe, *pathology, *out, *scanner;
   double numbers[7], size[2]; // of the pose as typed; pixels
   sonde_pose pose;
   bool posed, json;
@@ -73,19 +74,23 @@ static const app_option TABLE[] = {
     OPT_INTEGER(seed, "seed", "N", 0, 1000000000, "of the tissue's scatterers"),
     OPT_OUTPUT(out, "o", "PNG", "the picture"),
     OPT_JSON(json),
-    OPT_GROUP("The scanner")};
+    OPT_GROUP("The scanner"),
+    OPT_TEXT(
+        scanner, "scanner", "NAME|FILE",
+        "a scanner that ships (sonde scanner list) or a file; its settings are the defaults of "
+        "those below")};
+
+static const struct {
+  const char *key, *name, *value, *help;
+} SETTINGS[] = {{"depth_mm", "depth-mm", "D", "imaged depth"},
+                {"frequency_mhz", "frequency-mhz", "F", "of the beam"},
+                {"focus_mm", "focus-mm", "D", "of the beam"},
+                {"gain_db", "gain-db", "G", "gain"},
+                {"tgc_db_per_cm", "tgc-db-cm", "G", "on top of the default time-gain compensation"},
+                {"dynamic_range_db", "range-db", "R", "dynamic range"}};
 
 // Settings of the scanner with the ranges of the library, which the page has too.
 static uint32_t list_settings(app_option *list, uint32_t room) {
-  static const struct {
-    const char *key, *name, *value, *help;
-  } SETTINGS[] = {
-      {"depth_mm", "depth-mm", "D", "imaged depth"},
-      {"frequency_mhz", "frequency-mhz", "F", "of the beam"},
-      {"focus_mm", "focus-mm", "D", "of the beam"},
-      {"gain_db", "gain-db", "G", "gain"},
-      {"tgc_db_per_cm", "tgc-db-cm", "G", "on top of the default time-gain compensation"},
-      {"dynamic_range_db", "range-db", "R", "dynamic range"}};
   const sonde_echo_range *ranges = sonde_echo_ranges();
   uint32_t count = 0;
   for (size_t k = 0; k < sizeof SETTINGS / sizeof *SETTINGS; ++k)
@@ -149,21 +154,38 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
   return status;
 }
 
+// A scanner and the settings that the words change in it.
+static sonde_status choose_scanner(options *o, sonde_scanner *scanner, sonde_error *error) {
+  sonde_status status = scanner_choose(o->scanner, scanner, error);
+  const sonde_echo_range *ranges = sonde_echo_ranges();
+  for (size_t k = 0; k < sizeof SETTINGS / sizeof *SETTINGS && !status; ++k)
+    for (const sonde_echo_range *r = ranges; r < ranges + SONDE_ECHO_SETTINGS; ++r)
+      if (strcmp(r->key, SETTINGS[k].key) == 0 && !app_option_given(SETTINGS[k].name))
+        memcpy((char *)&o->settings + r->offset, (const char *)&scanner->settings + r->offset,
+               sizeof(double));
+  if (isnan(o->radius_m) && scanner->radius_m > 0) o->radius_m = scanner->radius_m;
+  if (isnan(o->aperture_m) && scanner->aperture_m > 0) o->aperture_m = scanner->aperture_m;
+  return status;
+}
+
 static int run(void *from) {
-  const options *o = from;
+  options *o = from;
   assert(o->out && o->size[0] > 0 && o->size[1] > 0);
   settled s = {0};
   sonde_image image = {0};
   sonde_pathology pathology;
   sonde_error error = {0};
   app_progress_begin("pressing and drawing");
-  sonde_status status = sonde_pathology_preset(o->pathology, &pathology, &error);
+  sonde_scanner scanner;
+  sonde_status status = choose_scanner(o, &scanner, &error);
+  if (!status) status = sonde_pathology_preset(o->pathology, &pathology, &error);
   if (!status) status = settled_open(&s, o->model, o->probe, NULL, true, &error);
   if (!status) status = place(&s, o, &error);
   if (!status) {
     sonde_echo *echo = NULL;
     sonde_echo_def def = sonde_echo_def_default();
     def.seed = (uint64_t)o->seed;
+    def.scanner = &scanner;
     double aperture = isnan(o->aperture_m) ? 2 * s.probe.half_x_m : o->aperture_m;
     settled_update(&s, &pathology, 0, sonde_state_tick(s.state));
     status = sonde_echo_check_view(aperture, isnan(o->radius_m) ? 0 : o->radius_m, &error);

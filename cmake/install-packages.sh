@@ -23,6 +23,7 @@ build_packages() {
   need_command ninja ninja-build
   need_command pkg-config pkg-config
   need_library libpng libpng-dev
+  need_library libjpeg libjpeg-dev
   need_library sqlite3 libsqlite3-dev
   need_library yaml-0.1 libyaml-dev
   need_library - libnifti2-dev # no pkg-config file

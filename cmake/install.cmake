@@ -32,7 +32,7 @@ function(sonde_pc SONDE_PC_NAME)
   install(FILES ${PROJECT_BINARY_DIR}/${SONDE_PC_NAME}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 endfunction()
 sonde_pc(sonde OTHERS zlib)
-sonde_pc(sonde-files OF sonde OTHERS libpng yaml-0.1 zlib LIBS -lnifti2 -lznz)
+sonde_pc(sonde-files OF sonde OTHERS libpng libjpeg yaml-0.1 zlib LIBS -lnifti2 -lznz)
 sonde_pc(sonde-limb OF sonde-files sonde)
 sonde_pc(sonde-sweep OF sonde OTHERS zlib)
 sonde_pc(sonde-scene OF sonde-files sonde)
@@ -41,7 +41,7 @@ sonde_pc(sonde-exam OF sonde-fit sonde-files sonde OTHERS sqlite3 zlib)
 
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/thigh ${PROJECT_SOURCE_DIR}/data/scenes
-  ${PROJECT_SOURCE_DIR}/data/cases ${PROJECT_SOURCE_DIR}/data/protocols
+  ${PROJECT_SOURCE_DIR}/data/cases ${PROJECT_SOURCE_DIR}/data/protocols ${PROJECT_SOURCE_DIR}/data/scanners
   DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde/data)
 if(TARGET thigh)
   install(FILES ${SONDE_BUNDLED_MODEL} DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde)

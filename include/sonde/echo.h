@@ -62,7 +62,11 @@ typedef struct sonde_echo_def {
   uint32_t sample_count;    /**< per line, default 1024 */
   double scatterers_per_m3; /**< default: enough for developed speckle */
   uint64_t seed;
-  bool plain; /**< tissue without septa and bundles, for measurements */
+  bool plain;                          /**< tissue without septa and bundles, for measurements */
+  const struct sonde_scanner *scanner; /**< echo_scanner.h, copied; NULL: the plain scanner */
+  bool rolling; /**< a live picture: each render draws the next look of the scanner and shows the
+                     mean with the last ones, under its persistence; else every picture is drawn
+                     from all looks */
 } sonde_echo_def;
 
 /** All zero but the version. @thread any */
@@ -137,8 +141,8 @@ SONDE_API sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name
                                               sonde_error *error);
 SONDE_API const char *sonde_echo_kernels(const sonde_echo *echo); /**< @thread owner */
 
-/** Envelope before log compression of the last render: [sample_count*line_count], sample-major.
- *  @thread owner */
+/** Envelope before log compression of the last render, mean of the scanner's looks:
+ *  [sample_count*line_count], sample-major. @thread owner */
 SONDE_API const float *sonde_echo_envelope(const sonde_echo *echo, uint32_t *lines,
                                            uint32_t *samples);
 

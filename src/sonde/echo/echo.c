@@ -88,11 +88,29 @@ static size_t carve(sonde_echo *echo, char *block) {
   const double finest_m = LEAST_DEPTH_M / (double)(echo->samples - 1);
   CARVE(echo->grid,
         (2 * most_lines + 16) * (sonde_bands_window(cell_size_m, finest_m) + (size_t)2));
+  // Side lobes read zeros beside a row.
   for (int k = 0; k < SONDE_FINE; ++k) {
-    CARVE(echo->line_re[k], most_lines / SONDE_FINE);
-    CARVE(echo->line_im[k], most_lines / SONDE_FINE);
+    CARVE(echo->line_re[k], most_lines / SONDE_FINE + 2 * HAZE_REACH);
+    CARVE(echo->line_im[k], most_lines / SONDE_FINE + 2 * HAZE_REACH);
+    if (block) echo->line_re[k] += HAZE_REACH, echo->line_im[k] += HAZE_REACH;
   }
-  CARVE(echo->ring, lines * RING_PLANES * (2 * SONDE_MOST_TAPS + AXIAL_MOST));
+  CARVE(echo->ring, lines * RING_PLANES * (2 * SONDE_MOST_TAPS + AXIAL_MOST) * echo->looks);
+  for (uint32_t look = 0; look < echo->looks && !echo->bare; ++look) {
+    CARVE(echo->look[look], image);
+    for (int k = 0; k < SONDE_FINE; ++k) {
+      CARVE(echo->ramp_re[look][k], most_lines / SONDE_FINE);
+      CARVE(echo->ramp_im[look][k], most_lines / SONDE_FINE);
+    }
+  }
+  if (!echo->bare) {
+    for (int k = 0; k < SONDE_FINE; ++k) {
+      CARVE(echo->look_re[k], most_lines / SONDE_FINE);
+      CARVE(echo->look_im[k], most_lines / SONDE_FINE);
+    }
+    CARVE(echo->log, (lines + 2 * DISPLAY_MARGIN) * echo->samples);
+    CARVE(echo->coarse, (lines + 2 * DISPLAY_MARGIN) * echo->samples);
+    CARVE(echo->held, image);
+  }
   CARVE(echo->envelope, image);
   CARVE(echo->flat_envelope, image);
   CARVE(echo->grey, image);
@@ -149,6 +167,12 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
   double per_cell = made->density_m3 * cell_size_m * cell_size_m * cell_size_m;
   made->per_cell = (uint32_t)clamp(STEP * floor(per_cell / STEP + 0.5), 2 * STEP, MOST_PER_CELL);
   made->per_piece = (made->per_cell / 8 + ECHO_ALIGN - 1) / ECHO_ALIGN * ECHO_ALIGN;
+  made->rolling = def->rolling;
+  status = sonde_scanner_take(made, def->scanner, error);
+  if (status) {
+    sonde_free(made);
+    return status;
+  }
   made->block = SONDE_NEW(char, carve(made, NULL) + 63);
   if (made->block) carve(made, sonde_whole_lines(made->block));
   made->psf = SONDE_NEW(beam_psf, 1);

@@ -8,6 +8,7 @@
 #include "echo/psf.h"
 #include "interior/interior.h"
 #include "sonde/echo.h"
+#include "sonde/echo_scanner.h"
 #include "echo/reference.h"
 
 enum {
@@ -24,7 +25,9 @@ enum {
   // Cubes that the slab touches. The widest view that sonde_echo_check_view() allows is a sector of
   // 0.05 m^2, its slab at most 16 mm thick with a cube's width: 100,000 cubes of 2 mm.
   SONDE_MAX_CELLS = 1 << 17,
-  SONDE_SLAB_ROWS = 256, // depths at which the slab's height is tabulated
+  SONDE_SLAB_ROWS = 256,  // depths at which the slab's height is tabulated
+  SONDE_MAP_STEPS = 1020, // of the grey map
+  DISPLAY_MARGIN = 16,    // columns beside the picture that the filter reads
 };
 
 _Static_assert((int)MOST_LESIONS == (int)SONDE_LESIONS, "lesions in view");
@@ -48,6 +51,7 @@ typedef struct frame {
   const sonde_pathology *pathology;
   sonde_echo_settings settings;
   double tgc_db_per_m;
+  const sonde_scanner *scanner;
 } frame;
 
 // A node of the coarse plane. `in` turns small rest vectors into (columns, metres beside the
@@ -77,7 +81,10 @@ struct sonde_echo {
   bool plain;      // no texture
   float *coupling; // [padded] share of the amplitude that passes the face, 0..1
   sonde_echo_flow flow;
-  char *block; // of all float buffers but the coarse plane
+  sonde_scanner scanner;
+  bool bare;    // the plain scanner: the axial kernels' grey values are shown as they are
+  bool rolling; // one look per picture
+  char *block;  // of all float buffers but the coarse plane
 
   // Random tables (scatterers.c).
   // [POOL + LOOSE + POOL] sorted by z within each cube's share; then unsorted ones for pieces; then
@@ -145,10 +152,24 @@ struct sonde_echo {
 
   // The beam (beam_hot.c).
   float *line_re[SONDE_FINE], *line_im[SONDE_FINE]; // a row with its gain: [grid_lines / FINE]
-  float *ring;                                      // [2*MOST_TAPS+AXIAL_MOST][RING_PLANES][padded]
-  float *envelope;                                  // [samples][padded]
-  float *flat_envelope;                             // [samples][lines], what readers see
-  float *grey;                                      // [samples][padded]
+  float *ring;                    // [looks][2*MOST_TAPS+AXIAL_MOST][RING_PLANES][padded]
+  uint32_t looks;                 // of the scanner
+  uint32_t first_look, now_looks; // that this picture draws
+  uint32_t drawn_looks;           // that are fresh: of this beam and of these settings
+  float *ramp_re[SONDE_MOST_LOOKS][SONDE_FINE], *ramp_im[SONDE_MOST_LOOKS][SONDE_FINE];
+  float *look_re[SONDE_FINE], *look_im[SONDE_FINE]; // a row under a look's ramp
+  float *look[SONDE_MOST_LOOKS];                    // [samples][padded] its envelope
+  haze_taps haze;
+  float *envelope;      // [samples][padded]
+  float *flat_envelope; // [samples][lines], what readers see
+  float *grey;          // [samples][padded]
+
+  // The display (display_hot.c).
+  float *log;    // [samples][padded + 2 DISPLAY_MARGIN] grey before the filter, edges repeated
+  float *coarse; // [samples][padded + 2 DISPLAY_MARGIN] means over some rows of it
+  float *held;   // [samples][padded] the picture before, for persistence
+  bool is_held;  // there is one
+  float map[SONDE_MAP_STEPS + 2]; // grey values of the scanner's map
 };
 
 // Tables of scatterers, streamlines and noise of a new renderer.
@@ -178,6 +199,14 @@ void sonde_echo_beam(sonde_echo *echo, uint32_t band, bool tissue);
 double sonde_echo_compensation_db(const frame *f, double depth_m);
 // After the last one.
 void sonde_echo_beam_end(sonde_echo *echo);
+// Looks that this picture draws, and their ramps.
+void sonde_looks_begin(sonde_echo *echo);
+// Echoes of interfaces that the probe's face sends back into the tissue once more.
+void sonde_echo_ghosts(sonde_echo *echo);
+// Grey values of the picture from the looks' envelopes.
+void sonde_echo_display(sonde_echo *echo);
+// Checks and copies a scanner; NULL: the plain one.
+sonde_status sonde_scanner_take(sonde_echo *echo, const sonde_scanner *scanner, sonde_error *error);
 void sonde_echo_picture(sonde_echo *echo, sonde_image *image);
 
 // Point of the image in the probe frame: line, depth.
@@ -204,7 +233,6 @@ double sonde_echo_elevation(const sonde_echo *echo, double depth_m);
 // rest of the power. Measurements without texture are without clutter.
 static inline float sonde_clutter(const sonde_echo *echo) { return echo->plain ? 0 : 0.7f; }
 
-static const float sonde_white_db = 40; // white over the rms of muscle speckle
 // Speed of sound that the scanner assumes, m/s.
 static const double sonde_sound_m_s = 1540;
 

@@ -67,13 +67,21 @@ void sonde_echo_geometry(sonde_echo *echo, double aperture_m, const sonde_echo_s
   f->wavelength_m = sonde_sound_m_s / s.frequency_hz;
   f->focus_m = s.focus_m;
   f->settings = s;
+  f->scanner = &echo->scanner;
   f->tgc_db_per_m = sonde_echo_default_tgc_db_per_m(s.frequency_hz) + s.tgc_db_per_m;
   f->first_line = 0.5 * (echo->lines - 1);
 }
 
 beam_key sonde_echo_key(const frame *f) {
-  return (beam_key){f->frequency_hz,         f->focus_m, f->depth_m,
-                    f->pitch_m / SONDE_FINE, f->step_m,  f->radius_m};
+  return (beam_key){f->frequency_hz,
+                    f->focus_m,
+                    f->depth_m,
+                    f->pitch_m / SONDE_FINE,
+                    f->step_m,
+                    f->radius_m,
+                    f->scanner->transmit_f,
+                    f->scanner->receive_f,
+                    f->scanner->pulse_wavelengths};
 }
 
 // Builds the beam of a key beside the one in use, by so many steps; true when it is ready.
@@ -107,6 +115,7 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
     build_spare(echo, &key, SONDE_PSF_STEPS);
     beam_psf *old = echo->psf;
     echo->psf = echo->spare, echo->spare = old;
+    echo->drawn_looks = 0;
   }
   const beam_psf *psf = echo->psf;
   SONDE_ASSERT(psf->step == SONDE_PSF_STEPS && echo->cell_m > 0);
@@ -142,6 +151,7 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   }
   sonde_bands_measure(echo);
   sonde_bands_begin(echo);
+  sonde_looks_begin(echo);
 }
 
 // ---- the stages -----------------------------------------------------------------------------
@@ -180,6 +190,7 @@ void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double ape
   sonde_echo_plane(echo);
   t->plane_s = lap(&now);
   sonde_echo_medium(echo);
+  sonde_echo_ghosts(echo);
   t->medium_s = lap(&now);
   sonde_echo_scatter(echo);
   sonde_echo_blood(echo);
@@ -192,6 +203,7 @@ void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double ape
     t->beam_s += lap(&now);
   }
   sonde_echo_beam_end(echo);
+  if (!echo->bare) sonde_echo_display(echo);
   sonde_echo_picture(echo, image);
   t->picture_s = lap(&now);
   t->scatterers = echo->moved;

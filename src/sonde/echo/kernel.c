@@ -19,4 +19,6 @@ const echo_kernels SONDE_KERNELS = {SONDE_KERNELS_NAME,
                                     widen,
                                     mix,
                                     fade,
-                                    convert};
+                                    convert,
+                                    look,
+                                    compress};

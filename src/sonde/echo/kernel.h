@@ -127,6 +127,30 @@ typedef struct stream_job {
   float *at, *sign; // [count] place about the segment's middle; +-1
 } stream_job;
 
+// Side lobes: what neighbours send into a column, a fixed pattern.
+enum { HAZE_TAPS = 9, HAZE_REACH = 16 }; // lines
+typedef struct haze_taps {
+  int32_t offset[HAZE_TAPS]; // lines
+  float re[HAZE_TAPS], im[HAZE_TAPS];
+} haze_taps;
+
+// A merged row with its side lobes, times a phase per column.
+typedef struct look_job {
+  const float *re[SONDE_FINE], *im[SONDE_FINE];           // [count], HAZE_REACH more on both sides
+  const float *ramp_re[SONDE_FINE], *ramp_im[SONDE_FINE]; // [count]
+  const haze_taps *haze;                                  // NULL: none
+  uint32_t count;                                         // multiple of ECHO_ALIGN
+  float *out_re[SONDE_FINE], *out_im[SONDE_FINE];         // [count]
+} look_job;
+
+// A row of the looks' mean envelope and its logarithm.
+typedef struct compress_job {
+  const float *look[5];  // [lines]
+  uint32_t looks, lines; // lines: multiple of ECHO_ALIGN
+  float offset_db, grey_per_db;
+  float *envelope, *grey; // [lines]
+} compress_job;
+
 typedef struct lateral_job {
   const float *re[SONDE_FINE], *im[SONDE_FINE]; // columns on lines, columns between; as merged
   uint32_t lines;                               // multiple of ECHO_ALIGN
@@ -147,7 +171,8 @@ typedef struct axial_job {
   float noise_size, compensation[AXIAL_MOST];
   float offset_db, grey_per_db; // grey = (dB + offset) * grey_per_db
   uint32_t lines;
-  float *envelope[AXIAL_MOST], *grey[AXIAL_MOST];
+  float *envelope[AXIAL_MOST];
+  float *grey[AXIAL_MOST]; // NULL: not wanted
 } axial_job;
 
 // What a vessel in view is made of.
@@ -230,7 +255,8 @@ typedef struct fade_job {
 // A row of pixels from [samples][lines] grey values.
 typedef struct convert_job {
   const float *grey;
-  uint32_t lines, samples, stride;            // floats per sample
+  uint32_t lines, samples, stride; // floats per sample
+  bool cubic;
   float x, dx, z;                             // of the first pixel and per pixel, m
   float lines_per_m, samples_per_m, radius_m; // curved face when radius > 0
   float first_line;                           // line at x = 0
@@ -253,6 +279,8 @@ typedef struct echo_kernels {
   void (*mix)(const float *top, const float *low, float share, float *out, uint32_t count);
   void (*fade)(const fade_job *job);
   void (*convert)(const convert_job *job);
+  void (*look)(const look_job *job);
+  void (*compress)(const compress_job *job);
 } echo_kernels;
 
 // The widest kernels that this processor runs, or those called `name`: avx512, avx2, sse4, base,

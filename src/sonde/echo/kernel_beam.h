@@ -55,6 +55,24 @@ static void merge(const merge_job *job) {
   }
 }
 
+// A merged row of a look: side lobes join, and every column turns by the look's phase.
+static void look(const look_job *job) {
+  SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
+  for (int part = 0; part < SONDE_FINE; ++part)
+    for (uint32_t l = 0; l < job->count; l += FLOATS) {
+      const float *re = job->re[part] + l, *im = job->im[part] + l;
+      floats x = vload(re), y = vload(im);
+      for (int t = 0; job->haze && t < HAZE_TAPS; ++t) {
+        const int32_t at = job->haze->offset[t];
+        floats a = vload(re + at), b = vload(im + at);
+        x = x + job->haze->re[t] * a - job->haze->im[t] * b;
+        y = y + job->haze->re[t] * b + job->haze->im[t] * a;
+      }
+      floats c = vload(job->ramp_re[part] + l), s = vload(job->ramp_im[part] + l);
+      vstore(job->out_re[part] + l, x * c - y * s), vstore(job->out_im[part] + l, y * c + x * s);
+    }
+}
+
 // Where it takes more than a load to spread a number over a vector, taps are spread once per job.
 enum { SPREAD = FLOATS == 4, LATERAL_SUMS = LATERAL_PARTS * SONDE_RANK };
 
@@ -122,6 +140,18 @@ INLINE floats decibels(floats a) {
   return 6.0205999f * (exponent + log2m);
 }
 
+static void compress(const compress_job *job) {
+  SONDE_ASSERT(job->looks > 0 && job->lines % ECHO_ALIGN == 0);
+  for (uint32_t l = 0; l < job->lines; l += FLOATS) {
+    floats mean = vload(job->look[0] + l);
+    for (uint32_t k = 1; k < job->looks; ++k) mean = mean + vload(job->look[k] + l);
+    mean = mean * (1.0f / (float)job->looks);
+    floats grey = (decibels(vmax(mean, vset(1e-20f))) + job->offset_db) * job->grey_per_db;
+    vstore(job->envelope + l, mean);
+    vstore(job->grey + l, vmin(vmax(grey, vset(0)), vset(255)));
+  }
+}
+
 // Noise, compensation, modulus and logarithm of a vector of lines.
 INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const floats *sum) {
   const float *noise = job->noise[sample] + l;
@@ -129,6 +159,7 @@ INLINE void finish_axial(const axial_job *job, int sample, uint32_t l, const flo
   floats im = job->noise_size * vload(noise + job->lines) + sum[1] + sum[3] + sum[5];
   floats size = job->compensation[sample] * vsqrt(re * re + im * im);
   vstore(job->envelope[sample] + l, size);
+  if (!job->grey[sample]) return;
   floats grey = (decibels(vmax(size, vset(1e-20f))) + job->offset_db) * job->grey_per_db;
   vstore(job->grey[sample] + l, vmin(vmax(grey, vset(0)), vset(255)));
 }

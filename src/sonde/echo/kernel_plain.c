@@ -149,7 +149,7 @@ static void axial(const axial_job *job) {
       double db = 20 * log10(fmax(size, 1e-20));
       double grey = (db + (double)job->offset_db) * (double)job->grey_per_db;
       job->envelope[sample][l] = (float)size;
-      job->grey[sample][l] = (float)fmin(fmax(grey, 0), 255);
+      if (job->grey[sample]) job->grey[sample][l] = (float)fmin(fmax(grey, 0), 255);
     }
 }
 
@@ -191,6 +191,39 @@ static void fade(const fade_job *job) {
   }
 }
 
+static void look(const look_job *job) {
+  for (uint32_t i = 0; i < SONDE_FINE * job->count; ++i) {
+    const uint32_t part = i % SONDE_FINE, l = i / SONDE_FINE;
+    double re = (double)job->re[part][l], im = (double)job->im[part][l];
+    for (int t = 0; job->haze && t < HAZE_TAPS; ++t) {
+      const float *x = job->re[part] + (int64_t)l + job->haze->offset[t],
+                  *y = job->im[part] + (int64_t)l + job->haze->offset[t];
+      const double u = (double)job->haze->re[t], v = (double)job->haze->im[t];
+      re += u * (double)*x - v * (double)*y, im += u * (double)*y + v * (double)*x;
+    }
+    const double c = (double)job->ramp_re[part][l], s = (double)job->ramp_im[part][l];
+    job->out_re[part][l] = (float)(re * c - im * s);
+    job->out_im[part][l] = (float)(im * c + re * s);
+  }
+}
+
+static void compress(const compress_job *job) {
+  for (uint32_t l = 0; l < job->lines; ++l) {
+    double mean = 0;
+    for (uint32_t k = 0; k < job->looks; ++k) mean += (double)job->look[k][l] / job->looks;
+    double db = 20 * log10(fmax(mean, 1e-20));
+    job->envelope[l] = (float)mean;
+    job->grey[l] =
+        (float)fmin(fmax((db + (double)job->offset_db) * (double)job->grey_per_db, 0), 255);
+  }
+}
+
+// Weights of four values at -1, 0, 1 and 2 that make a Catmull-Rom spline at t in [0, 1].
+static void cubic_weights(double t, double w[4]) {
+  w[0] = 0.5 * t * (-1 + t * (2 - t)), w[1] = 0.5 * (2 + t * t * (-5 + 3 * t));
+  w[2] = 0.5 * t * (1 + t * (4 - 3 * t)), w[3] = 0.5 * t * t * (t - 1);
+}
+
 static void convert(const convert_job *job) {
   SONDE_ASSERT(job->lines_per_m > 0);
   for (uint32_t c = 0; c < job->width; ++c) {
@@ -208,10 +241,30 @@ static void convert(const convert_job *job) {
     const size_t l = (size_t)line, n = (size_t)sample;
     const float *p = job->grey + n * job->stride + l, *q = p + job->stride;
     const double a = line - (double)l, b = sample - (double)n;
+    if (job->cubic) {
+      // Between lines; between samples, below a flat face. Outer lines and samples are repeated.
+      double across[4], down[4] = {0, 1 - b, b, 0}, row = 0;
+      cubic_weights(a, across);
+      if (!(job->radius_m > 0)) cubic_weights(b, down);
+      for (int i = 0; i < 4; ++i) {
+        int64_t x = (int64_t)l + i - 1;
+        double value = 0;
+        x = x < 0 ? 0 : x < job->lines ? x : job->lines - 1;
+        for (int k = 0; k < 4; ++k) {
+          int64_t y = (int64_t)n + k - 1;
+          y = y < 0 ? 0 : y < job->samples ? y : job->samples - 1;
+          value += down[k] * (double)job->grey[y * job->stride + x];
+        }
+        row += across[i] * fmin(fmax(value, 0), 255);
+      }
+      job->out[c] = (uint8_t)(fmin(fmax(row, 0), 255) + 0.5);
+      continue;
+    }
     job->out[c] = (uint8_t)((1 - b) * ((1 - a) * (double)p[0] + a * (double)p[1]) +
                             b * ((1 - a) * (double)q[0] + a * (double)q[1]) + 0.5);
   }
 }
 
-const echo_kernels sonde_echo_kernels_plain = {
-    "plain", splat, warp, smooth, stream, lateral, axial, tissue, merge, widen, mix, fade, convert};
+const echo_kernels sonde_echo_kernels_plain = {"plain", splat, warp,    smooth, stream,
+                                               lateral, axial, tissue,  merge,  widen,
+                                               mix,     fade,  convert, look,   compress};

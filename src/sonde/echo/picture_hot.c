@@ -1,5 +1,5 @@
-// Last stage: grey pixels from the grey values of lines and samples. Scan conversion is bilinear,
-// with square pixels, black beside the lines.
+// Last stage: grey pixels from the grey values of lines and samples. Scan conversion is bilinear or
+// bicubic, with square pixels, black beside the lines.
 #include "base/base.h"
 #include "echo/echo.h"
 
@@ -17,6 +17,7 @@ void sonde_echo_picture(sonde_echo *echo, sonde_image *image) {
                      .lines = echo->lines,
                      .samples = echo->samples,
                      .stride = echo->padded,
+                     .cubic = f->scanner->cubic > 0.5,
                      .x = (float)((0.5 - 0.5 * image->width) * pixel),
                      .dx = (float)pixel,
                      .lines_per_m = (float)(1 / f->pitch_m),

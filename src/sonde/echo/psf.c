@@ -23,6 +23,8 @@ sonde_array sonde_beam_array(const beam_key *key) {
   a.frequency_hz = key->frequency_hz;
   a.focus_m = key->focus_m;
   a.radius_m = key->radius_m;
+  a.transmit_f = key->transmit_f, a.receive_f = key->receive_f;
+  a.pulse_wavelengths = key->pulse_wavelengths;
   return a;
 }
 

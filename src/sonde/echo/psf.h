@@ -15,6 +15,7 @@ enum {
 // What a beam depends on.
 typedef struct beam_key {
   double frequency_hz, focus_m, depth_m, pitch_m, step_m, radius_m;
+  double transmit_f, receive_f, pulse_wavelengths; // of the scanner
 } beam_key;
 
 // Around a scatterer between lines and samples the response is

@@ -207,7 +207,7 @@ sonde_status sonde_echo_reference_points(const sonde_echo *echo, double aperture
       samples[1] >= echo->samples)
     return sonde_fail(error, SONDE_ARGUMENT, "window beyond the %u lines of %u samples",
                       echo->lines, echo->samples);
-  sonde_echo view = {.lines = echo->lines, .samples = echo->samples};
+  sonde_echo view = {.lines = echo->lines, .samples = echo->samples, .scanner = echo->scanner};
   view.frame.radius_m = echo->frame.radius_m;
   sonde_echo_geometry(&view, aperture_m, settings);
   const frame *f = &view.frame;
