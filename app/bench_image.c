@@ -3,6 +3,7 @@
 #include "bench_image.h"
 
 #include "pose.h"
+#include "scanner_choice.h"
 #include "settled.h"
 
 #include <assert.h>
@@ -17,7 +18,7 @@ typedef struct options {
   const char *model, *scene;
   long lines, samples, scatterers, frames;
   double size[2];
-  const char *kernels;
+  const char *kernels, *scanner;
   double radius_m;
   bool json;
 } options;
@@ -48,6 +49,7 @@ static const app_option TABLE[] = {
     OPT_TEXT(kernels, "kernels", "NAME",
              "avx512, avx2, sse4, base, plain; default the widest that runs here"),
     OPT_REAL(radius_m, "curved-mm", "R", 20, 1000, 1e-3, "radius of a curved face; default flat"),
+    OPT_TEXT(scanner, "scanner", "NAME|FILE", "a live picture of this scanner; default plain"),
     OPT_JSON(json)};
 
 static void draw(bench *b, uint64_t tick) {
@@ -65,7 +67,10 @@ static sonde_status make_echo(bench *b, const options *o, double density, sonde_
   def.sample_count = (uint32_t)o->samples;
   def.scatterers_per_m3 = density;
   def.seed = 1;
-  sonde_status status = sonde_echo_create(b->scene.interior, &def, &b->echo, error);
+  sonde_scanner scanner;
+  sonde_status status = scanner_choose(o->scanner, &scanner, error);
+  def.scanner = &scanner, def.rolling = true;
+  if (!status) status = sonde_echo_create(b->scene.interior, &def, &b->echo, error);
   if (!status && o->kernels) status = sonde_echo_set_kernels(b->echo, o->kernels, error);
   if (!status) status = sonde_echo_check_view(2 * b->scene.probe.half_x_m, o->radius_m, error);
   return status ? status : sonde_echo_set_radius(b->echo, o->radius_m, error);

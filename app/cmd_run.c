@@ -3,6 +3,7 @@
 #include "exam_common.h"
 #include "options.h"
 #include "run_device.h"
+#include "scanner_choice.h"
 
 #include <assert.h>
 #include <math.h>
@@ -15,7 +16,7 @@ enum { MAX_PROBES = 16 };
 
 typedef struct options {
   const char *model, *record, *probe, *pathology, *preset, *compare;
-  const char *trainee, *exams, *cases, *protocols;
+  const char *trainee, *exams, *cases, *protocols, *scanner;
   long port;
   double seconds, gel_m3;
   bool headless, lockstep, json, no_gel, circulate;
@@ -48,6 +49,8 @@ static const app_option TABLE[] = {
     OPT_TEXT(preset, "preset", "FILE", "damping, stiffness and friction, see sonde-identify(1)"),
     OPT_TEXT(compare, "compare", "FILE",
              "a second preset, which the controls of the page can change over to"),
+    OPT_TEXT(scanner, "scanner", "NAME|FILE",
+             "a scanner that ships (sonde scanner list) or a file; default plain"),
     OPT_REAL(gel_m3, "gel-ml", "V", 0, 1000, 1e-6,
              "gel spread over the sites at the start; 0: dry skin"),
     OPT_FLAG(no_gel, "no-gel", "no gel is simulated: every line of the image is coupled"),
@@ -351,6 +354,7 @@ static int run(void *from) {
   def.record_path = s->record;
   def.controls.gel = !s->no_gel;
   def.gel_m3 = s->gel_m3;
+  sonde_scanner scanner;
   def.circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
   def.controls.posture = s->posture;
   run_device_limits(&s->device, &def);
@@ -373,6 +377,10 @@ static int run(void *from) {
   // State of the vein, and the presets that the page can change over between.
   const char *const presets[SONDE_SESSION_PRESETS] = {s->preset, s->compare};
   sonde_status status = sonde_pathology_preset(s->pathology, &def.controls.pathology, &error);
+  if (!status && s->scanner) {
+    status = scanner_choose(s->scanner, &scanner, &error);
+    def.scanner = &scanner, def.controls.echo = scanner.settings;
+  }
   for (int k = 0; k < SONDE_SESSION_PRESETS && presets[k] && !status; ++k)
     status = sonde_preset_load(presets[k], &def.presets[def.preset_count++], &error);
   if (status) {

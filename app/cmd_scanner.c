@@ -120,29 +120,6 @@ static sonde_status list_scanners(bool json, sonde_error *error) {
   return status;
 }
 
-static void show(const sonde_scanner *scanner, bool json) {
-  uint32_t count;
-  const sonde_scanner_number *numbers = sonde_scanner_numbers(&count);
-  if (json) app_json_begin();
-  for (const sonde_scanner_number *n = numbers; n < numbers + count; ++n) {
-    const double value = *(const double *)(const void *)((const char *)scanner + n->offset) / n->si;
-    if (json)
-      app_json_real(n->key, value);
-    else
-      printf("%-18s %10.4g   %g to %g, plain %g\n", n->key, value, n->low, n->high, n->plain);
-  }
-  if (!json) printf("%-18s", "sliders_db");
-  if (json) app_json_array("sliders_db");
-  for (int k = 0; k < SONDE_SCANNER_SLIDERS; ++k)
-    json ? app_json_real(NULL, scanner->slider_db[k]) : (void)printf(" %g", scanner->slider_db[k]);
-  if (json) {
-    app_json_close();
-    app_json_end();
-  } else {
-    printf("\n");
-  }
-}
-
 // Quantiles of the stills of a folder.
 static sonde_status measure_stills(options *o, uint32_t *stills, uint32_t *patches,
                                    sonde_error *error) {
@@ -215,15 +192,43 @@ static int run(void *from) {
   assert(o->action != NULL);
   if (strcmp(o->action, "list") == 0) {
     status = list_scanners(o->json, &error);
-  } else if (strcmp(o->action, "fit") == 0) {
+    return status ? app_fail(VERB, &error) : APP_OK;
+  }
+  if (strcmp(o->action, "fit") == 0) {
     app_catch_interrupt();
     status = fit(o, &error);
-  } else {
-    sonde_scanner scanner;
-    status = scanner_choose(o->what, &scanner, &error);
-    if (!status) show(&scanner, o->json);
+    return status ? app_fail(VERB, &error) : APP_OK;
   }
-  return status ? app_fail(VERB, &error) : APP_OK;
+  // All numbers of one scanner.
+  sonde_scanner scanner;
+  if (scanner_choose(o->what, &scanner, &error)) return app_fail(VERB, &error);
+  uint32_t count;
+  const sonde_scanner_number *numbers = sonde_scanner_numbers(&count);
+  if (o->json) app_json_begin();
+  for (const sonde_scanner_number *n = numbers; n < numbers + count; ++n) {
+    const double value =
+        *(const double *)(const void *)((const char *)&scanner + n->offset) / n->si;
+    if (o->json)
+      app_json_real(n->key, value);
+    else
+      printf("%-18s %10.4g   %g to %g, plain %g\n", n->key, value, n->low, n->high, n->plain);
+  }
+  if (o->json)
+    app_json_array("sliders_db");
+  else
+    printf("%-18s", "sliders_db");
+  for (int k = 0; k < SONDE_SCANNER_SLIDERS; ++k)
+    if (o->json)
+      app_json_real(NULL, scanner.slider_db[k]);
+    else
+      printf(" %g", scanner.slider_db[k]);
+  if (o->json) {
+    app_json_close();
+    app_json_end();
+  } else {
+    printf("\n");
+  }
+  return APP_OK;
 }
 
 const app_command cmd_scanner = {

@@ -89,29 +89,6 @@ static sonde_status judge(const scanner_fit *fit, bench *b, const sonde_scanner 
   return SONDE_OK;
 }
 
-// A normal number by the polar form, from a xorshift state.
-static double draw(uint64_t *state) {
-  double u[2];
-  for (int k = 0; k < 2; ++k) {
-    *state ^= *state << 13, *state ^= *state >> 7, *state ^= *state << 17;
-    u[k] = ((double)(*state >> 11) + 0.5) * 0x1p-53;
-  }
-  return sqrt(-2 * log(u[0])) * cos(6.283185307179586 * u[1]);
-}
-
-// A scanner whose searched numbers stand at shares of their ranges, mirrored at the ends.
-static sonde_scanner at_shares(const scanner_fit *fit, double x[NUMBERS]) {
-  sonde_scanner scanner = fit->scanner;
-  for (int i = 0; i < NUMBERS; ++i) {
-    double si, *value = member(&scanner, i, &si);
-    if (x[i] < 0) x[i] = fmin(-x[i], 1);
-    if (x[i] > 1) x[i] = fmax(2 - x[i], 0);
-    *value = si * (SEARCHED[i].low + x[i] * (SEARCHED[i].high - SEARCHED[i].low));
-  }
-  scanner.settings.focus_m = 0.5 * scanner.settings.depth_m;
-  return scanner;
-}
-
 static sonde_status search(scanner_fit *fit, bench *b, sonde_error *error) {
   const double n = NUMBERS, mu = PARENTS / 1.3;
   const double learn_step = (mu + 2) / (n + mu + 3);
@@ -131,8 +108,21 @@ static sonde_status search(scanner_fit *fit, bench *b, sonde_error *error) {
        done += (uint32_t)POPULATION) {
     int order[POPULATION];
     for (int k = 0; k < POPULATION && !status; ++k) {
-      for (int i = 0; i < NUMBERS; ++i) x[k][i] = mean[i] + size * sqrt(spread[i]) * draw(&state);
-      const sonde_scanner candidate = at_shares(fit, x[k]);
+      // A candidate: normal numbers by the polar form about the mean, mirrored at the ends.
+      sonde_scanner candidate = fit->scanner;
+      for (int i = 0; i < NUMBERS; ++i) {
+        double u[2], si, *value = member(&candidate, i, &si);
+        for (int pair = 0; pair < 2; ++pair) {
+          state ^= state << 13, state ^= state >> 7, state ^= state << 17;
+          u[pair] = ((double)(state >> 11) + 0.5) * 0x1p-53;
+        }
+        const double normal = sqrt(-2 * log(u[0])) * cos(6.283185307179586 * u[1]);
+        double at = mean[i] + size * sqrt(spread[i]) * normal;
+        at = at < 0 ? fmin(-at, 1) : at > 1 ? fmax(2 - at, 0) : at;
+        *value = si * (SEARCHED[i].low + at * (SEARCHED[i].high - SEARCHED[i].low));
+        x[k][i] = at;
+      }
+      candidate.settings.focus_m = 0.5 * candidate.settings.depth_m;
       status = judge(fit, b, &candidate, found, &cost[k], error);
       if (!status && cost[k] < best) {
         best = cost[k], chosen = candidate;

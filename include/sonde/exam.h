@@ -50,17 +50,19 @@ typedef struct sonde_session_def {
   sonde_session_controls controls;             /**< at the start; the counters count from there */
   uint32_t preset_count;                       /**< 0: the model's springs and world.friction */
   sonde_preset presets[SONDE_SESSION_PRESETS]; /**< tissues to compare; controls.preset chooses */
-  double gel_m3;                      /**< spread over the model's sites at the start; default 0 */
-  bool circulate;                     /**< circulation gives the vessels' pressures, not the case */
-  sonde_circulation circulation;      /**< posture and strain follow the controls */
-  const sonde_findings *findings;     /**< copied; NULL: none */
-  uint32_t image_width, image_height; /**< default 512 x 512 */
-  uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: no
-                                           more often, when the image thread is free; default 20 */
-  const char *record_path;            /**< NULL: no recording; format: docs/recording.md. A file
-                                           that is there gets the name PATH.old */
-  const char *record_setup;           /**< text of a SONDE_NOTE_SETUP that is on the disk before the
-                                           first tick; NULL: none */
+  double gel_m3;                  /**< spread over the model's sites at the start; default 0 */
+  bool circulate;                 /**< circulation gives the vessels' pressures, not the case */
+  sonde_circulation circulation;  /**< posture and strain follow the controls */
+  const sonde_findings *findings; /**< copied; NULL: none */
+  const struct sonde_scanner *scanner; /**< copied; live pictures by it (echo_scanner.h); NULL: the
+                                            plain one */
+  uint32_t image_width, image_height;  /**< default 512 x 512 */
+  uint32_t ticks_per_image;            /**< lockstep: an image every so many ticks; real time: no
+                                            more often, when the image thread is free; default 20 */
+  const char *record_path;             /**< NULL: no recording; format: docs/recording.md. A file
+                                            that is there gets the name PATH.old */
+  const char *record_setup; /**< text of a SONDE_NOTE_SETUP that is on the disk before the
+                                 first tick; NULL: none */
   /** Gets every image, also those that no reader of sonde_session_frame() sees; NULL: nobody.
    *  @thread image thread, or the owner's in lockstep and in sonde_session_stop() */
   void (*watch)(void *user, const sonde_frame *frame);

@@ -48,7 +48,10 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   if (!status && inside) status = sonde_interior_create(def->model, &session->interior, error);
   if (!status && inside)
     status = sonde_interior_set_findings(session->interior, def->findings, error);
-  if (!status && inside) status = sonde_echo_create(session->interior, NULL, &session->echo, error);
+  sonde_echo_def image = sonde_echo_def_default();
+  image.scanner = def->scanner, image.rolling = def->scanner != NULL;
+  if (!status && inside)
+    status = sonde_echo_create(session->interior, &image, &session->echo, error);
   if (!status) {
     size_t vectors = session->nodes * sizeof(sonde_vec3);
     size_t surface_end = sizeof(sonde_surface_slot), frame_end = sizeof(sonde_frame);

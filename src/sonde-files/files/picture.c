@@ -54,24 +54,6 @@ static sonde_status load_jpeg(const char *path, const uint8_t *bytes, size_t cou
   return status;
 }
 
-static sonde_status load_png(const char *path, const uint8_t *bytes, size_t count,
-                             sonde_image *image, sonde_error *error) {
-  png_image png = {.version = PNG_IMAGE_VERSION};
-  if (!png_image_begin_read_from_memory(&png, bytes, count))
-    return sonde_fail(error, SONDE_FORMAT, "%s: %s", path, png.message);
-  png.format = PNG_FORMAT_GRAY;
-  sonde_status status = sonde_image_create(png.width, png.height, image, error);
-  if (!status) {
-    const png_color black = {0, 0, 0};
-    if (!png_image_finish_read(&png, &black, image->pixels, 0, NULL)) {
-      status = sonde_fail(error, SONDE_FORMAT, "%s: %s", path, png.message);
-      sonde_image_clear(image);
-    }
-  }
-  png_image_free(&png);
-  return status;
-}
-
 sonde_status sonde_image_load(const char *path, sonde_image *image, sonde_error *error) {
   SONDE_ASSERT(path != NULL && image != NULL);
   static const uint8_t PNG[] = {0x89, 'P', 'N', 'G'}, JPEG[] = {0xff, 0xd8};
@@ -81,9 +63,17 @@ sonde_status sonde_image_load(const char *path, sonde_image *image, sonde_error 
   sonde_status status = sonde_bounded_load(path, &sonde_limits_image, &bytes, &count, error);
   if (status) return status;
   const uint8_t *data = (const uint8_t *)bytes;
-  if (count >= sizeof PNG && memcmp(data, PNG, sizeof PNG) == 0)
-    status = load_png(path, data, count, image, error);
-  else if (count >= sizeof JPEG && memcmp(data, JPEG, sizeof JPEG) == 0)
+  if (count >= sizeof PNG && memcmp(data, PNG, sizeof PNG) == 0) {
+    png_image png = {.version = PNG_IMAGE_VERSION};
+    const png_color black = {0, 0, 0};
+    bool good = png_image_begin_read_from_memory(&png, data, count) != 0;
+    png.format = PNG_FORMAT_GRAY;
+    if (good) status = sonde_image_create(png.width, png.height, image, error);
+    if (good && !status) good = png_image_finish_read(&png, &black, image->pixels, 0, NULL) != 0;
+    if (!good) status = sonde_fail(error, SONDE_FORMAT, "%s: %s", path, png.message);
+    if (!good) sonde_image_clear(image);
+    png_image_free(&png);
+  } else if (count >= sizeof JPEG && memcmp(data, JPEG, sizeof JPEG) == 0)
     status = load_jpeg(path, data, count, image, error);
   else
     status = sonde_fail(error, SONDE_FORMAT, "%s: expected a PNG or JPEG picture", path);

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_ECHO_KERNEL_H
 #define SONDE_SRC_ECHO_KERNEL_H
 
+#include "echo/kernel_looks.h"
 #include "echo/plane.h"
 #include "echo/psf.h"
 
@@ -18,10 +19,8 @@ enum {
   KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
-  SONDE_FINE = 2, // columns of the grid per scan line
   SONDE_TILE_SIDE = 64,
   SONDE_TILES = 2, // fat, muscle
-  AXIAL_MOST = 4,  // samples summed at once
 };
 
 // Of a tile: x of the voxels that a step along z moves the pattern by, so that a plane through it
@@ -127,54 +126,6 @@ typedef struct stream_job {
   float *at, *sign; // [count] place about the segment's middle; +-1
 } stream_job;
 
-// Side lobes: what neighbours send into a column, a fixed pattern.
-enum { HAZE_TAPS = 9, HAZE_REACH = 16 }; // lines
-typedef struct haze_taps {
-  int32_t offset[HAZE_TAPS]; // lines
-  float re[HAZE_TAPS], im[HAZE_TAPS];
-} haze_taps;
-
-// A merged row with its side lobes, times a phase per column.
-typedef struct look_job {
-  const float *re[SONDE_FINE], *im[SONDE_FINE];           // [count], HAZE_REACH more on both sides
-  const float *ramp_re[SONDE_FINE], *ramp_im[SONDE_FINE]; // [count]
-  const haze_taps *haze;                                  // NULL: none
-  uint32_t count;                                         // multiple of ECHO_ALIGN
-  float *out_re[SONDE_FINE], *out_im[SONDE_FINE];         // [count]
-} look_job;
-
-// A row of the looks' mean envelope and its logarithm.
-typedef struct compress_job {
-  const float *look[5];  // [lines]
-  uint32_t looks, lines; // lines: multiple of ECHO_ALIGN
-  float offset_db, grey_per_db;
-  float *envelope, *grey; // [lines]
-} compress_job;
-
-typedef struct lateral_job {
-  const float *re[SONDE_FINE], *im[SONDE_FINE]; // columns on lines, columns between; as merged
-  uint32_t lines;                               // multiple of ECHO_ALIGN
-  int half;
-  // re, im - re, re + im: with z = x + i y, sums of re (x + y), (im - re) x and (re + im) y take
-  // three multiplications instead of four
-  float tap[SONDE_MOST_TAPS + 1][SONDE_RANK][LATERAL_PARTS];
-  float *out; // [RING_PLANES][lines] re, im of each term
-} lateral_job;
-
-// Some samples of all lines: each starts a row after the one before.
-typedef struct axial_job {
-  const float *rows[2 * SONDE_MOST_TAPS + AXIAL_MOST]; // of lateral results, first to last
-  int count;
-  float tap[2 * SONDE_MOST_TAPS + 1][SONDE_RANK];
-  int samples;                    // up to AXIAL_MOST
-  const float *noise[AXIAL_MOST]; // [2*lines]
-  float noise_size, compensation[AXIAL_MOST];
-  float offset_db, grey_per_db; // grey = (dB + offset) * grey_per_db
-  uint32_t lines;
-  float *envelope[AXIAL_MOST];
-  float *grey[AXIAL_MOST]; // NULL: not wanted
-} axial_job;
-
 // What a vessel in view is made of.
 typedef struct tissue_vessel {
   float wall_m, clot_fraction, clot_scatter;
@@ -251,18 +202,6 @@ typedef struct fade_job {
   float fresh, kept; // of the tail per row: what joins it, what losses leave of it
   uint32_t lines;    // multiple of ECHO_ALIGN
 } fade_job;
-
-// A row of pixels from [samples][lines] grey values.
-typedef struct convert_job {
-  const float *grey;
-  uint32_t lines, samples, stride; // floats per sample
-  bool cubic;
-  float x, dx, z;                             // of the first pixel and per pixel, m
-  float lines_per_m, samples_per_m, radius_m; // curved face when radius > 0
-  float first_line;                           // line at x = 0
-  uint32_t width;
-  uint8_t *out;
-} convert_job;
 
 typedef struct echo_kernels {
   const char *name;
