@@ -15,7 +15,7 @@ enum { LEVELS = 4, MIDDLE = 1, STEPS = 150, MODELS = 6 };
 static const double EDGE_M[LEVELS] = {16e-3, 8e-3, 4e-3, 2e-3};
 // Cells are halved: only edges that are halves of each other leave the rest of the mesh as it is.
 static const double COARSE_EDGE_M = 16e-3, REACH_M = 0.025, DEPTH_M = 6e-3;
-static const double EQUAL_PERCENT[2] = {5, 12}; // with few coarse meshes, of --quick, the second
+static const double EQUAL_PERCENT[2] = {10, 12}; // with few coarse meshes, of --quick, the second
 
 static const struct {
   const char *key, *name;

@@ -70,12 +70,16 @@ uint32_t sonde_face_tree_pairs(const sonde_face_tree *a, const sonde_face_tree *
                                uint32_t (*pairs)[2], uint32_t capacity, uint64_t *work);
 
 /**
- * Whether the mesh crosses itself: an edge of one face passes through the inside of another that
- * shares at most one corner with it.
+ * Whether an edge of one of the mesh's first `count` faces passes through the inside of another
+ * of them that shares at most one corner with it.
  * @param[out] faces of the first such pair, the lower number first
  * @thread tick
  */
-bool sonde_face_tree_crosses(const sonde_face_tree *tree, uint32_t faces[2]);
+bool sonde_face_tree_crosses(const sonde_face_tree *tree, uint32_t count, uint32_t faces[2]);
+
+/** Count of faces whose boxes come within reach_m, of which `capacity` are written. @thread tick */
+uint32_t sonde_face_tree_within(const sonde_face_tree *tree, sonde_vec3 from, double reach_m,
+                                uint32_t *faces, uint32_t capacity);
 
 /** A point of a mesh and the way to it from a point beside it. */
 typedef struct sonde_face_point {

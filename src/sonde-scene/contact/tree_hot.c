@@ -100,7 +100,7 @@ static bool edges_cross(const sonde_vec3 *x, const uint32_t a[3], const uint32_t
   return false;
 }
 
-bool sonde_face_tree_crosses(const sonde_face_tree *tree, uint32_t faces[2]) {
+bool sonde_face_tree_crosses(const sonde_face_tree *tree, uint32_t count, uint32_t faces[2]) {
   tree_pairs stack = {.depth = 0};
   SONDE_ASSERT(tree != NULL && faces != NULL);
   tree_push(&stack, 0, 0);
@@ -115,7 +115,9 @@ bool sonde_face_tree_crosses(const sonde_face_tree *tree, uint32_t faces[2]) {
         sonde_bounds box = face_bounds(tree, i), other = face_bounds(tree, j);
         int common = 0;
         for (int k = 0; k < 9; ++k) common += a[k / 3] == b[k % 3];
-        if (tree->face[i] >= tree->face[j] || common > 1 || !bounds_meet(&box, &other, 0)) continue;
+        if (tree->face[i] >= tree->face[j] || tree->face[j] >= count || common > 1 ||
+            !bounds_meet(&box, &other, 0))
+          continue;
         if (!edges_cross(tree->vertices, a, b) && !edges_cross(tree->vertices, b, a)) continue;
         faces[0] = tree->face[i], faces[1] = tree->face[j];
         return true;
@@ -129,6 +131,31 @@ static double box_distance2(const sonde_bounds *box, sonde_vec3 p) {
   double y = fmax(fmax(box->low.y - p.y, p.y - box->high.y), 0);
   double z = fmax(fmax(box->low.z - p.z, p.z - box->high.z), 0);
   return x * x + y * y + z * z;
+}
+
+uint32_t sonde_face_tree_within(const sonde_face_tree *tree, sonde_vec3 from, double reach_m,
+                                uint32_t *faces, uint32_t capacity) {
+  SONDE_ASSERT(tree != NULL && tree->node_count > 0 && reach_m >= 0);
+  uint32_t stack[TREE_STACK], depth = 0, count = 0;
+  stack[depth++] = 0;
+  while (depth) {
+    uint32_t at = stack[--depth];
+    const tree_node *node = &tree->nodes[at];
+    if (box_distance2(&node->box, from) > reach_m * reach_m) continue;
+    if (!node->count) {
+      SONDE_ASSERT(depth + 2 <= TREE_STACK);
+      stack[depth++] = node->first;
+      stack[depth++] = at + 1;
+      continue;
+    }
+    for (uint32_t i = node->first; i < node->first + node->count; ++i) {
+      sonde_bounds box = face_bounds(tree, i);
+      if (box_distance2(&box, from) > reach_m * reach_m) continue;
+      if (count < capacity) faces[count] = tree->face[i];
+      ++count;
+    }
+  }
+  return count;
 }
 
 // Branch and bound over the tree. Of faces equally near, as at an edge, the one that looks most

@@ -48,7 +48,7 @@ sonde_status sonde_mesh_check_solid(const sonde_mesh *mesh, sonde_error *error) 
   sonde_face_tree *tree = NULL;
   uint32_t faces[2];
   status = sonde_face_tree_create(mesh, &tree, error);
-  if (!status && sonde_face_tree_crosses(tree, faces))
+  if (!status && sonde_face_tree_crosses(tree, mesh->face_count, faces))
     status = sonde_fail(error, SONDE_MESH, "the surface cuts itself: triangles %u and %u", faces[0],
                         faces[1]);
   sonde_face_tree_destroy(tree);

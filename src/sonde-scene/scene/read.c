@@ -327,6 +327,7 @@ sonde_status sonde_scene_parse(const char *text, const char *name, const char *t
       sonde_body *b = &scene->bodies[k];
       b->first_slot = scene->slot_count;
       b->slot_count = sonde_body_is_rigid(b) ? 2 : b->node_count;
+      scene->self_nodes += b->self_m > 0 ? b->node_count : 0;
       b->first_pair = scene->pair_count;
       scene->slot_count += b->slot_count;
       scene->pair_count += b->model ? b->model->topology.edge_count : b->spring_count;

@@ -304,6 +304,7 @@ static void read_deformable(const sonde_scene_source *source, sonde_place at, so
   body->rest_volume_m3 = report.volume_m3;
   if (body->bulk_n_m5 > 0 && !body->closed)
     sonde_reader_fail(reader, at, SONDE_MESH, "bulk_n_m5 needs a closed mesh");
+  sonde_read_self(reader, at, body);
   sonde_place held = sonde_read_find(reader, at, "held_mm");
   for (uint32_t k = 0, count = sonde_read_count(reader, held); k < count; ++k) {
     sonde_place entry = sonde_read_item(reader, held, k);
@@ -326,11 +327,27 @@ static void read_deformable(const sonde_scene_source *source, sonde_place at, so
 void sonde_read_body(const sonde_scene_source *source, sonde_place at, const sonde_scene *scene,
                      sonde_body *body) {
   SONDE_ASSERT(source->reader && body);
-  static const char *const KEYS[] = {"name",          "kind",          "shape",        "motion",
-                                     "position_mm",   "rotation",      "material",     "mass_kg",
-                                     "density_kg_m2", "density_kg_m3", "velocity_m_s", "spin_rad_s",
-                                     "path",          "springs",       "lattice",      "model",
-                                     "held_mm",       "loads",         "sags",         NULL};
+  static const char *const KEYS[] = {"name",
+                                     "kind",
+                                     "shape",
+                                     "motion",
+                                     "position_mm",
+                                     "rotation",
+                                     "material",
+                                     "mass_kg",
+                                     "density_kg_m2",
+                                     "density_kg_m3",
+                                     "velocity_m_s",
+                                     "spin_rad_s",
+                                     "path",
+                                     "springs",
+                                     "lattice",
+                                     "model",
+                                     "held_mm",
+                                     "loads",
+                                     "sags",
+                                     "self_contact_mm",
+                                     NULL};
   static const char *const KINDS[] = {"rigid",     "springs",    "lattice",
                                       "two_layer", "volumetric", NULL};
   static const char *const MOTIONS[] = {"free", "fixed", "driven", NULL};
@@ -383,6 +400,7 @@ void sonde_body_clear(sonde_body *body) {
   sonde_free(body->pairs);
   sonde_free(body->spring);
   sonde_free(body->crease);
+  sonde_free(body->self_area_m2);
   sonde_model_destroy(body->model);
   sonde_model_destroy(body->solid);
 }

@@ -84,6 +84,7 @@ static sonde_status thicken(sonde_body *body, double thickness_m, sonde_error *e
   SONDE_ASSERT(status || used == mesh->face_count);
   for (uint32_t i = 0; i < 2 * n && !status; ++i) body->surface_node[i] = i % n;
   body->offset_m = 0.5 * thickness_m;
+  body->middle_faces = middle.face_count;
   if (!status) sonde_sheet_surface(body, body->node, mesh->vertices);
   sonde_topology_clear(&around);
   sonde_mesh_clear(&middle);
@@ -100,4 +101,29 @@ void sonde_read_sheet(sonde_reader *reader, sonde_place springs, sonde_body *bod
   sonde_error error = {0};
   if (thickness_m > 0 && sonde_reader_good(reader) && thicken(body, thickness_m, &error))
     sonde_reader_pass(reader, springs, &error);
+}
+
+void sonde_read_self(sonde_reader *reader, sonde_place at, sonde_body *body) {
+  // A sheet touches itself where its middle comes nearer to itself than it is thick; other bodies
+  // do where the file gives a distance.
+  sonde_place distance = sonde_read_find(reader, at, "self_contact_mm");
+  body->self_m = 1e-3 * sonde_read_real(reader, at, "self_contact_mm", 0, SONDE_SCENE_FAR_MM,
+                                        2e3 * body->offset_m);
+  if (body->model && distance)
+    sonde_reader_fail(reader, distance, SONDE_ARGUMENT,
+                      "a two-layer tissue does not touch itself: its anchors hold it apart");
+  if (body->self_m > 0) body->self_area_m2 = SONDE_NEW(double, body->node_count);
+  sonde_error error = {0};
+  if (body->self_m > 0 && !body->self_area_m2 && sonde_fail_memory(&error))
+    sonde_reader_pass(reader, at, &error);
+  if (!(body->offset_m > 0)) body->middle_faces = body->surface.face_count;
+  for (uint32_t f = 0; f < body->middle_faces && body->self_area_m2; ++f) {
+    const uint32_t node[3] = {sonde_body_corner(body, f, 0), sonde_body_corner(body, f, 1),
+                              sonde_body_corner(body, f, 2)};
+    sonde_vec3 x = body->node[node[0]];
+    sonde_vec3 normal = v_cross(v_sub(body->node[node[1]], x), v_sub(body->node[node[2]], x));
+    // A third of the face for each node, and half of that: a node meets faces, and the nodes of
+    // those faces meet the node's own.
+    for (int k = 0; k < 3; ++k) body->self_area_m2[node[k]] += 0.5 * 0.5 * v_norm(normal) / 3;
+  }
 }

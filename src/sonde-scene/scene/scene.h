@@ -67,8 +67,11 @@ typedef struct sonde_body {
   sonde_spring *spring; // [springs]
   uint32_t crease_count;
   sonde_crease *crease; // [creases] of a sheet
-  double offset_m;  // of a sheet: half its thickness; surface vertices stand so far off their nodes
-  double bulk_n_m5; // pressure per change of volume; 0: none
+  double offset_m; // of a sheet: half its thickness; surface vertices stand so far off their nodes
+  double self_m;   // distance within which parts of the body push each other; 0: they do not
+  uint32_t middle_faces; // of the surface, its first: of a sheet the upper side, else all
+  double *self_area_m2;  // [nodes] half of the area around each, where self_m > 0
+  double bulk_n_m5;      // pressure per change of volume; 0: none
   double rest_volume_m3; // closed
   uint32_t first_pair;
   sonde_model *model; // two-layer
@@ -108,6 +111,7 @@ struct sonde_scene {
   sonde_material *materials;
   sonde_pin *pins;
   uint32_t pin_count, attachment_count;
+  uint32_t self_nodes; // nodes of the bodies that may touch themselves
   uint32_t slot_count, pair_count;
   uint32_t (*pairs)[2]; // [pair_count] slots
   uint64_t checksum;
@@ -149,10 +153,17 @@ void sonde_source_path(const sonde_scene_source *source, const char *name, char 
 void sonde_read_lattice(const sonde_scene_source *source, sonde_place at, sonde_body *body);
 // Gives a sheet thickness: a closed surface around its nodes, and creases (entry `sheet`).
 void sonde_read_sheet(sonde_reader *reader, sonde_place springs, sonde_body *body);
+// Distance and areas of a deformable body's contact with itself (entry `self_contact_mm`).
+void sonde_read_self(sonde_reader *reader, sonde_place at, sonde_body *body);
 // Vertices of a sheet's surface, upper side first, off its nodes. @thread tick
 void sonde_sheet_surface(const sonde_body *body, const sonde_vec3 *node, sonde_vec3 *vertices);
 // Angle between the faces at a crease, 0 when flat, and its gradient by the four nodes.
 double sonde_crease_angle(const sonde_crease *crease, const sonde_vec3 *x, sonde_vec3 gradient[4]);
+// Node at a corner of a deformable body's face.
+static inline uint32_t sonde_body_corner(const sonde_body *body, uint32_t face, int corner) {
+  uint32_t vertex = body->surface.faces[face][corner];
+  return body->surface_node ? body->surface_node[vertex] : vertex;
+}
 // Springs of a surface from its edges (entry `springs`).
 void sonde_read_springs(const sonde_scene_source *source, sonde_place at, sonde_body *body);
 

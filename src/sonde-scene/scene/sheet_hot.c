@@ -32,9 +32,8 @@ void sonde_sheet_surface(const sonde_body *body, const sonde_vec3 *node, sonde_v
   uint32_t n = body->node_count;
   // The lower vertices hold the sums of the faces' areas while normals are made.
   for (uint32_t i = 0; i < n; ++i) vertices[n + i] = vec3(0, 0, 0);
-  for (uint32_t f = 0; f < body->surface.face_count; ++f) {
+  for (uint32_t f = 0; f < body->middle_faces; ++f) {
     const uint32_t *v = body->surface.faces[f];
-    if (v[0] >= n || v[1] >= n || v[2] >= n) break; // the upper side comes first
     sonde_vec3 area = v_cross(v_sub(node[v[1]], node[v[0]]), v_sub(node[v[2]], node[v[0]]));
     for (int k = 0; k < 3; ++k) vertices[n + v[k]] = v_add(vertices[n + v[k]], area);
   }

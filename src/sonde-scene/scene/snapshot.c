@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const char MAGIC[8] = "SONDESNP";
-enum { SNAPSHOT_VERSION = 3 };
+enum { SNAPSHOT_VERSION = 4 };
 
 typedef struct header {
   char magic[8];

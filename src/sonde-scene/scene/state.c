@@ -47,6 +47,7 @@ static void lay_motion(const sonde_scene_state *state, carver *c, sonde_scene_mo
   CARVE(motion->release, scene->touch_count);
   CARVE(motion->pair, scene->touch_count);
   CARVE(motion->calm_s, scene->body_count);
+  CARVE(motion->self_j, scene->body_count);
   CARVE(motion->asleep, scene->body_count);
   CARVE(motion->calm, scene->slot_count);
   CARVE(motion->bond, 0);
@@ -138,7 +139,8 @@ static sonde_status allocate(sonde_scene_state *state, sonde_error *error) {
   uint32_t pairs = scene->touch_count, room = points < most ? (uint32_t)points : most;
   if (pairs > NEIGHBOURS * bodies) pairs = NEIGHBOURS * bodies;
   state->grip_capacity = room;
-  state->push_capacity = room + REGIONS * pairs + 3 * scene->pin_count + creases;
+  state->push_capacity =
+      room + REGIONS * pairs + 3 * scene->pin_count + creases + 2 * scene->self_nodes;
   state->term_capacity = state->push_capacity + 2 * room + bodies;
   state->bulk_row_capacity = bulk;
   state->row_capacity = bulk + 3 * 8 * room + 2 * state->surface_count + 4 * state->push_capacity;
@@ -416,6 +418,7 @@ sonde_body_measure sonde_scene_measure(const sonde_scene_state *state, uint32_t 
     m.elastic_j = body->model   ? sonde_tissue_energy(body->model, x)
                   : body->solid ? sonde_bulk_energy(state->solid[b], x)
                                 : sonde_network_energy(body, x);
+    m.elastic_j += state->now.self_j[b];
   }
   if (body->motion == SONDE_BODY_FREE && sonde_body_weighs(body))
     m.gravity_j = -body->mass.mass_kg * v_dot(state->scene->gravity_m_s2, m.centre_m);

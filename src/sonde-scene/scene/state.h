@@ -40,6 +40,7 @@ typedef struct sonde_scene_motion {
   uint8_t *release;         // [touches] 1: a was wholly inside b and is not out yet; 2: b inside a
   sonde_pair_measure *pair; // [touches] contact in the last step; kept while both bodies rest
   double *calm_s;           // [bodies] how long a body has been slow
+  double *self_j;           // [bodies] energy of a body's contact with itself
   uint8_t *asleep;          // [bodies] 1: it rests until something touches it
   uint8_t *calm;            // [slots] steps at rest of a tissue's node; many: it sleeps
   sonde_bond *bond;         // [bond_capacity] of the touches in contact, one after the other
@@ -48,7 +49,9 @@ typedef struct sonde_scene_motion {
 // A push of one body on another along generalised coordinates: a quantity u (depth of a column or
 // volume of a region) grows at the rate sum g.v, and the force on the slots is -f g.
 typedef struct sonde_push {
-  uint32_t touch; // UINT32_MAX: an attachment, which may pull
+  uint32_t touch; // UINT32_MAX: an attachment, a crease or a body's contact with itself
+  uint32_t body;  // that touches itself
+  bool pulls;     // an attachment or a crease; contact never pulls
   uint32_t first_row, row_count;
   double value, end_value;  // u at the evaluation and at the end of the step
   double newtons;           // |sum of g on one side|: f times this is the push in N

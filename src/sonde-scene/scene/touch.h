@@ -19,6 +19,8 @@ sonde_push *sonde_push_new(sonde_scene_state *state, uint32_t touch);
 void sonde_pins_push(sonde_scene_state *state);
 // The same of creases. @thread tick
 void sonde_creases_push(sonde_scene_state *state);
+// The pushes of bodies on themselves; their trees are those of the stage. @thread tick
+void sonde_selves_push(sonde_scene_state *state);
 // Notices a body wholly inside the other of a touch. @thread tick
 void sonde_release_notice(sonde_scene_state *state, uint32_t touch,
                           const sonde_overlap_result *found);

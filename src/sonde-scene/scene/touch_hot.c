@@ -103,7 +103,8 @@ sonde_push *sonde_push_new(sonde_scene_state *state, uint32_t t) {
     return NULL;
   }
   sonde_push *push = &state->pushes[state->push_count++];
-  *push = (sonde_push){.touch = t, .first_row = state->row_count, .newtons = 1};
+  *push = (sonde_push){
+      .touch = t, .pulls = t == UINT32_MAX, .first_row = state->row_count, .newtons = 1};
   return push;
 }
 
@@ -345,7 +346,7 @@ void sonde_touch_find(sonde_scene_state *state, bool start) {
   state->row_count = state->bulk_row_capacity;
   sonde_pins_push(state);
   sonde_creases_push(state);
-  if (!scene->touch_count) return;
+  if (!scene->touch_count && !scene->self_nodes) return;
   for (uint32_t k = 0; k < state->near_touch_count; ++k)
     if (!sonde_touch_rests(state, state->near_touch[k]))
       state->now.pair[state->near_touch[k]] = (sonde_pair_measure){0};
@@ -360,6 +361,7 @@ void sonde_touch_find(sonde_scene_state *state, bool start) {
     }
     state->bounds[b] = sonde_face_tree_bounds(state->tree[b]);
   }
+  sonde_selves_push(state);
   uint32_t count = sonde_sweep_pairs(state->sweep, state->bounds, scene->body_count, state->near,
                                      state->near_capacity, NULL);
   SONDE_ASSERT(count <= state->near_capacity);
@@ -392,7 +394,7 @@ void sonde_touch_evaluate(sonde_scene_state *state, double moved_s) {
     double rate = along_rows(state, push, state->stage_velocity);
     push->force = push->stiffness * push->value + push->damper * rate;
     // An attachment may pull; a contact's damping never does.
-    push->dropped = push->touch != UINT32_MAX && !(push->force > 0);
+    push->dropped = !push->pulls && !(push->force > 0);
     if (push->dropped) push->force = 0;
     push->end_force = push->force;
     push->end_value = push->value;
@@ -460,7 +462,7 @@ uint32_t sonde_touch_predict(sonde_scene_state *state) {
     if (push->dropped) continue;
     push->end_force = push->force + push->stiffness * displacement +
                       push->damper * along_rows(state, push, state->gain);
-    if (push->end_force >= 0 || push->touch == UINT32_MAX) continue;
+    if (push->end_force >= 0 || push->pulls) continue;
     push->dropped = true;
     push->end_force = 0;
     ++dropped;
@@ -471,16 +473,20 @@ uint32_t sonde_touch_predict(sonde_scene_state *state) {
 
 void sonde_touch_finish(sonde_scene_state *state, double h) {
   SONDE_ASSERT(h > 0);
+  for (uint32_t b = 0; b < state->scene->body_count; ++b)
+    if (!state->now.asleep[b]) state->now.self_j[b] = 0;
   // Forces and torques about the world's origin follow from the rows of a's and b's slots.
   for (uint32_t k = 0; k < state->push_count; ++k) {
     const sonde_push *push = &state->pushes[k];
+    double stored_m = fmax(push->end_value, 0);
+    double energy_j = 0.5 * push->stiffness * stored_m * stored_m;
+    if (push->touch == UINT32_MAX && !push->pulls) state->now.self_j[push->body] += energy_j;
     if (push->touch == UINT32_MAX) continue;
     const sonde_touch *touch = &state->scene->touches[push->touch];
     sonde_pair_measure *pair = &state->now.pair[push->touch];
     const sonde_body *a = body_of(state, touch->a), *b = body_of(state, touch->b);
     pair->normal_n += push->end_force * push->newtons;
-    if (push->end_value > 0)
-      pair->energy_j += 0.5 * push->stiffness * push->end_value * push->end_value;
+    pair->energy_j += energy_j;
     for (uint32_t r = push->first_row; r < push->first_row + push->row_count; ++r) {
       uint32_t s = state->rows[r];
       sonde_vec3 force = v_scale(state->g[r], -push->end_force);

@@ -114,8 +114,8 @@ void sonde_trouble_inspect(sonde_scene_state *state) {
     double volume = sonde_network_volume(body, state->now.position + body->first_slot);
     if (!(volume > 0)) sonde_scene_note(state, SONDE_SCENE_INVERTED, b, UINT32_MAX);
   }
-  // Nothing pushes the sides of one body apart. Whether a surface went through itself is looked at
-  // every tenth step, until it was found.
+  // Whether a surface went through itself is looked at every tenth step, until it was found. Of a
+  // sheet the middle is: where it is bent by less than its thickness its inner side crosses itself.
   enum { CROSSED_PERIOD = 10 };
   bool due = (state->now.head->tick + 1) % CROSSED_PERIOD == 0;
   for (uint32_t b = 0; due && b < state->scene->body_count; ++b) {
@@ -123,11 +123,16 @@ void sonde_trouble_inspect(sonde_scene_state *state) {
     bool layers = body->model && !body->model->bulk;
     if (sonde_body_is_rigid(body) || layers || !state->tree[b] || state->now.asleep[b]) continue;
     if (state->now.head->event[CROSSED_EVENT].count) continue;
-    uint32_t faces[2];
+    uint32_t faces[2], count = body->surface.face_count;
     sonde_vec3 *surface = state->surface + state->surface_first[b];
     sonde_surface_at(state, b, state->now.position, state->now.rotation, surface);
+    if (body->offset_m > 0) {
+      for (uint32_t i = 0; i < body->surface.vertex_count; ++i)
+        surface[i] = state->now.position[body->first_slot + body->surface_node[i]];
+      count = body->middle_faces;
+    }
     sonde_face_tree_refit(state->tree[b], surface);
-    if (sonde_face_tree_crosses(state->tree[b], faces))
+    if (sonde_face_tree_crosses(state->tree[b], count, faces))
       sonde_scene_note(state, SONDE_SCENE_INVERTED, b, UINT32_MAX);
   }
 }
