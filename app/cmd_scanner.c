@@ -145,7 +145,10 @@ static sonde_status measure_stills(options *o, uint32_t *stills, uint32_t *patch
     status = app_error(error, SONDE_ARGUMENT,
                        "%s holds %u patches of 64 x 64 pixels that are not black, expected 32",
                        o->what, table->patches);
-  if (!status) texture_quantiles(table, o->fit.real);
+  if (!status) {
+    texture_quantiles(table, o->fit.real);
+    o->fit.real_dark = (double)table->dark / (table->dark + table->patches);
+  }
   *stills = count, *patches = table ? table->patches : 0;
   free_names(names, count);
   free(table);

@@ -44,12 +44,12 @@ static double *member(sonde_scanner *scanner, int number, double *si) {
 }
 
 // Distance of a scanner's pictures from the stills: the mean square over all quantiles, in spreads
-// of the stills, each at most 9.
+// of the stills, each at most 9, and over the share of dark patches.
 static sonde_status judge(const scanner_fit *fit, bench *b, const sonde_scanner *scanner,
                           double found[TEXTURE_FEATURES][TEXTURE_QUANTILES], double *distance,
                           sonde_error *error) {
   sonde_status status = SONDE_OK;
-  b->table->patches = 0;
+  b->table->patches = b->table->dark = 0;
   for (uint32_t m = 0; m < fit->models && !status; ++m) {
     settled *s = &b->scene[m];
     sonde_echo *echo = NULL;
@@ -85,7 +85,11 @@ static sonde_status judge(const scanner_fit *fit, bench *b, const sonde_scanner 
       const double off = 2.5 * (found[n][q] - fit->real[n][q]) / spread;
       sum += fmin(off * off, 9);
     }
-  *distance = sum / (TEXTURE_FEATURES * TEXTURE_QUANTILES);
+  // Pictures are as much in the dark as the stills: a tenth more or less is one spread.
+  const double dark = (double)b->table->dark / (b->table->dark + b->table->patches);
+  const double off = 10 * (dark - fit->real_dark);
+  sum += TEXTURE_QUANTILES * fmin(off * off, 9);
+  *distance = sum / ((TEXTURE_FEATURES + 1) * TEXTURE_QUANTILES);
   return SONDE_OK;
 }
 

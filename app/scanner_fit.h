@@ -14,6 +14,7 @@ typedef struct scanner_fit {
   uint64_t seed;
   sonde_scanner scanner; // where the search begins and what it found
   double before, after;  // mean squared distance of the quantiles, in spreads of the stills
+  double real_dark;      // share of the stills' patches that are too dark
   double real[TEXTURE_FEATURES][TEXTURE_QUANTILES], found[TEXTURE_FEATURES][TEXTURE_QUANTILES];
 } scanner_fit;
 

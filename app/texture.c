@@ -16,7 +16,7 @@ static const char *const NAMES[TEXTURE_FEATURES] = {
     "skewness",       "kurtosis",       "axial width",    "lateral width",  "axial lag 4",
     "lateral lag 4",  "axial lag 8",    "lateral lag 8",  "line direction", "line strength",
     "energy at 1 px", "energy at 2 px", "energy at 4 px", "energy at 8 px", "tails at 1 px",
-    "tails at 4 px"};
+    "tails at 4 px",  "axial lag 1",    "axial lag 2",    "lateral lag 1",  "lateral lag 2"};
 
 const char *texture_name(uint32_t feature) {
   assert(feature < TEXTURE_FEATURES);
@@ -89,6 +89,7 @@ static void measure(const double *p, double f[TEXTURE_FEATURES]) {
   for (int k = 0; k < LAGS; ++k)
     down[k] = correlation(rest, k, 0) / zero, across[k] = correlation(rest, 0, k) / zero;
   f[7] = half_width(down), f[8] = half_width(across);
+  f[21] = down[1], f[22] = down[2], f[23] = across[1], f[24] = across[2];
   f[9] = down[4], f[10] = across[4], f[11] = down[8], f[12] = across[8];
   // Structure tensor of the patch.
   double h[SIDE * SIDE], xx = 1e-6, yy = 1e-6, xy = 0;
@@ -137,7 +138,10 @@ void texture_add(texture_table *table, const sonde_image *image, uint32_t most) 
       p[i] = weight > 0 ? sum / weight : 0;
       mean += p[i] / (SIDE * SIDE), dark += p[i] < 2;
     }
-    if (mean < 8 || dark > 0.4 * SIDE * SIDE) continue;
+    if (mean < 8 || dark > 0.4 * SIDE * SIDE) {
+      ++table->dark;
+      continue;
+    }
     measure(p, f);
     fit = table->patches++;
     ++taken;

@@ -4,11 +4,11 @@
 
 #include "sonde/sonde.h"
 
-enum { TEXTURE_FEATURES = 21, TEXTURE_QUANTILES = 3, TEXTURE_MOST_PATCHES = 4096 };
+enum { TEXTURE_FEATURES = 25, TEXTURE_QUANTILES = 3, TEXTURE_MOST_PATCHES = 4096 };
 
 // Features of the patches of some pictures.
 typedef struct texture_table {
-  uint32_t patches;
+  uint32_t patches, dark; // that count, that do not
   double feature[TEXTURE_FEATURES][TEXTURE_MOST_PATCHES];
 } texture_table;
 

@@ -6,112 +6,159 @@
 
 #include <string.h>
 
-enum { BLOCK = 4, SMOOTHED = 3 }; // lines of a block; taps to either side of its middle
+enum { BLOCK = 4, SIDE_TAPS = 2, TAPS = 2 * SIDE_TAPS + 1 }; // lines of a block; smoothing taps
 
-// A block's smoothing: taps along a direction, each between two lines.
+// Means over `every` samples with the lines beside the picture, and what is found in them.
+typedef struct coarse {
+  uint32_t rows, every, stride; // floats per row, of the logarithm as well
+  float *mean, *blur;           // [rows][stride] the means; means of 3 x 3 of them
+  float (*tensor)[3];           // [rows][blocks] sums of dx dx, dz dz, dx dz over a block
+  uint32_t blocks;
+} coarse;
+
+// Smoothing of a block: taps along a direction, each between two lines.
 typedef struct block_filter {
-  int32_t row[2 * SMOOTHED + 1], line[2 * SMOOTHED + 1]; // from a point of the block
-  float next[2 * SMOOTHED + 1];                          // share of the line after it
-  float weight;                                          // of the smoothed value
+  int32_t row[TAPS], line[TAPS]; // from a point of the block
+  float next[TAPS];              // share of the line after it
+  float weight;                  // of the smoothed value
 } block_filter;
 
-static uint32_t log_stride(const sonde_echo *echo) { return echo->padded + 2 * DISPLAY_MARGIN; }
+// As instructions, where the library's functions would be called.
+static inline float between(float value, float low, float high) {
+  return value < low ? low : value > high ? high : value;
+}
 
-// Structure tensor of a block of lines on a coarse row, over 5 x 7 values; lengths in metres.
-static block_filter find_filter(const sonde_echo *echo, const float *mean, uint32_t row,
-                                uint32_t line, uint32_t every) {
+static uint32_t within(int32_t row, uint32_t rows) {
+  return row < 0 ? 0 : row < (int32_t)rows ? (uint32_t)row : rows - 1;
+}
+
+// The coarse rows of a logarithm, their blur and the structure tensors of their blocks.
+static void make_coarse(const sonde_echo *echo, const coarse *c) {
+  const uint32_t stride = c->stride;
+  const float share = 1 / (float)c->every, ninth = 1.0f / 9;
+  for (uint32_t row = 0; row < c->rows; ++row) {
+    const float *in = echo->log + (size_t)row * c->every * stride;
+    float *out = c->mean + (size_t)row * stride;
+    memcpy(out, in, stride * sizeof *out);
+    for (uint32_t n = 1; n < c->every; ++n)
+      for (uint32_t l = 0; l < stride; ++l) out[l] += in[n * stride + l];
+    for (uint32_t l = 0; l < stride; ++l) out[l] *= share;
+  }
   const frame *f = &echo->frame;
-  const uint32_t stride = log_stride(echo), rows = echo->samples / every;
-  const float depth = (float)((row + 0.5) * every * f->step_m);
-  const float pitch = (float)f->pitch_m * (f->radius_m > 0 ? 1 + depth / (float)f->radius_m : 1);
-  const float down = (float)(every * f->step_m);
-  float xx = 0, zz = 0, xz = 0;
-  for (int32_t j = -2; j <= 2; ++j) {
-    int32_t at = (int32_t)row + j;
-    at = at < 1 ? 1 : at + 2 > (int32_t)rows ? (int32_t)rows - 2 : at;
-    const float *p = mean + (uint32_t)at * stride + DISPLAY_MARGIN + line;
-    for (int32_t i = -2; i < BLOCK + 2; ++i) {
-      const float dx = (p[i + 1] - p[i - 1]) / pitch;
-      const float dz = (p[i + (int32_t)stride] - p[i - (int32_t)stride]) / down;
-      xx += dx * dx, zz += dz * dz, xz += dx * dz;
+  for (uint32_t row = 0; row < c->rows; ++row) {
+    const float *here = c->mean + (size_t)row * stride;
+    const float *above = c->mean + (size_t)within((int32_t)row - 1, c->rows) * stride;
+    const float *below = c->mean + (size_t)within((int32_t)row + 1, c->rows) * stride;
+    const double depth = (row + 0.5) * c->every * f->step_m;
+    const double pitch = f->pitch_m * (f->radius_m > 0 ? 1 + depth / f->radius_m : 1);
+    // A slope along depth in units of one from line to line.
+    const float steep = (float)(pitch / (c->every * f->step_m));
+    for (uint32_t block = 0; block < c->blocks; ++block) {
+      const uint32_t l = DISPLAY_MARGIN + BLOCK * block;
+      const float_x4 left = vload_float_x4(here + l - 1), right = vload_float_x4(here + l + 1);
+      const float_x4 up = vload_float_x4(above + l), down = vload_float_x4(below + l);
+      const float_x4 dx = right - left, dz = steep * (down - up);
+      const float_x4 xx = dx * dx, zz = dz * dz, xz = dx * dz;
+      float *sum = c->tensor[row * c->blocks + block];
+      sum[0] = vsum_float_x4(xx), sum[1] = vsum_float_x4(zz), sum[2] = vsum_float_x4(xz);
+      const float_x4 three = left + vload_float_x4(here + l) + right;
+      const float_x4 over = vload_float_x4(above + l - 1) + up + vload_float_x4(above + l + 1);
+      const float_x4 under = vload_float_x4(below + l - 1) + down + vload_float_x4(below + l + 1);
+      vstore_float_x4(c->blur + (size_t)row * stride + l, (three + over + under) * ninth);
     }
   }
-  // The direction in which the picture changes least, and how much less than across it.
-  const float sum = xx + zz + 1e-9f, difference = zz - xx;
-  const float length = sqrtf(difference * difference + 4 * xz * xz);
-  const float coherence = length / sum;
-  float x = sqrtf(0.5f * fmaxf(1 + difference / (length + 1e-12f), 0));
-  float z = sqrtf(fmaxf(1 - x * x, 0));
-  if (xz > 0) z = -z;
-  block_filter filter = {.weight = (float)f->scanner->filter *
-                                   (float)clamp(((double)coherence - 0.15) / 0.5, 0, 1)};
-  const float reach = (float)f->scanner->filter_m;
-  for (int t = -SMOOTHED; t <= SMOOTHED; ++t) {
-    const float away = reach * (float)t / SMOOTHED, most = DISPLAY_MARGIN - 2;
-    const float across = fminf(fmaxf(away * x / pitch, -most), most), whole = floorf(across);
-    filter.line[t + SMOOTHED] = (int32_t)whole, filter.next[t + SMOOTHED] = across - whole;
-    filter.row[t + SMOOTHED] = (int32_t)floorf(away * z / (float)f->step_m + 0.5f);
+}
+
+// The direction in which the picture about a block changes least, and how much less than across it.
+static block_filter find_filter(const sonde_echo *echo, const coarse *c, uint32_t row,
+                                uint32_t block) {
+  const frame *f = &echo->frame;
+  float xx = 0, zz = 0, xz = 0;
+  for (int32_t j = -2; j <= 2; ++j) {
+    const float(*at)[3] =
+        (const float(*)[3])c->tensor + within((int32_t)row + j, c->rows) * c->blocks;
+    const uint32_t left = block > 0 ? block - 1 : block;
+    const uint32_t right = block + 1 < c->blocks ? block + 1 : block;
+    xx += at[block][0] + 0.5f * (at[left][0] + at[right][0]);
+    zz += at[block][1] + 0.5f * (at[left][1] + at[right][1]);
+    xz += at[block][2] + 0.5f * (at[left][2] + at[right][2]);
+  }
+  const float difference = zz - xx, length = sqrtf(difference * difference + 4 * xz * xz);
+  const float coherence = length / (xx + zz + 1e-9f);
+  const float strength = between((coherence - 0.15f) * 2, 0, 1);
+  block_filter filter = {.weight = (float)f->scanner->filter * strength};
+  if (!(filter.weight > 0)) return filter;
+  const float x = sqrtf(0.5f * between(1 + difference / (length + 1e-12f), 0, 2));
+  const float side = sqrtf(between(1 - x * x, 0, 1)), z = xz > 0 ? -side : side;
+  const float depth = (float)((row + 0.5) * c->every * f->step_m);
+  const float pitch = (float)f->pitch_m * (f->radius_m > 0 ? 1 + depth / (float)f->radius_m : 1);
+  const float most = DISPLAY_MARGIN - 2, reach = (float)f->scanner->filter_m / SIDE_TAPS;
+  for (int t = 0; t < TAPS; ++t) {
+    const float away = reach * (float)(t - SIDE_TAPS);
+    const float across = between(away * x / pitch, -most, most);
+    filter.line[t] = (int32_t)(across + DISPLAY_MARGIN) - DISPLAY_MARGIN; // rounded down
+    filter.next[t] = across - (float)filter.line[t];
+    const float rows = away * z / (float)f->step_m;
+    filter.row[t] = (int32_t)(rows < 0 ? rows - 0.5f : rows + 0.5f);
   }
   return filter;
 }
 
 // Smooths a block along its direction, sharpens it, mixes it with the picture before and maps it.
-static void filter_block(sonde_echo *echo, const float *mean, uint32_t row, uint32_t line,
-                         uint32_t every, const block_filter *filter) {
-  static const float bell[2 * SMOOTHED + 1] = {0.0702f, 0.1311f, 0.1907f, 0.216f,
-                                               0.1907f, 0.1311f, 0.0702f};
-  const uint32_t stride = log_stride(echo), rows = echo->samples / every;
+static void filter_block(sonde_echo *echo, const coarse *c, uint32_t row, uint32_t block,
+                         const block_filter *filter) {
+  static const float bell[TAPS] = {0.11f, 0.24f, 0.30f, 0.24f, 0.11f};
+  const uint32_t stride = c->stride, line = BLOCK * block;
   const float sharp = (float)echo->frame.scanner->sharpening;
-  const float keep = (float)echo->frame.scanner->persistence;
-  const uint32_t end = row + 1 == rows ? echo->samples : (row + 1) * every;
-  for (uint32_t n = row * every; n < end; ++n) {
-    const float *here = echo->log + (size_t)n * stride + DISPLAY_MARGIN + line;
-    float_x4 value = vload_float_x4(here), smooth = vset_float_x4(0);
-    for (int t = 0; t < 2 * SMOOTHED + 1 && filter->weight > 0; ++t) {
-      int32_t at = (int32_t)n + filter->row[t];
-      at = at < 0 ? 0 : at < (int32_t)echo->samples ? at : (int32_t)echo->samples - 1;
-      const float *p =
-          echo->log + (size_t)at * stride + DISPLAY_MARGIN + (int32_t)line + filter->line[t];
-      float_x4 left = vload_float_x4(p), right = vload_float_x4(p + 1);
-      smooth = smooth + bell[t] * (left + filter->next[t] * (right - left));
-    }
-    if (filter->weight > 0) value = value + filter->weight * (smooth - value);
-    if (sharp > 0) {
-      // The blur: means of 3 x 3 coarse values, between coarse rows.
-      const float to = ((float)n + 0.5f) / (float)every - 0.5f;
-      const float low = fminf(fmaxf(to, 1), (float)rows - 3), from = floorf(low);
-      const float *p = mean + (size_t)from * stride + DISPLAY_MARGIN + line;
-      float_x4 sum[4];
-      for (int k = 0; k < 4; ++k) {
-        const float *q = p + (ptrdiff_t)(k - 1) * (ptrdiff_t)stride;
-        sum[k] = vload_float_x4(q - 1) + vload_float_x4(q) + vload_float_x4(q + 1);
+  const float keep = echo->is_held ? (float)echo->frame.scanner->persistence : 0;
+  const uint32_t end = row + 1 == c->rows ? echo->samples : (row + 1) * c->every;
+  for (uint32_t n = row * c->every; n < end; ++n) {
+    const float *log = echo->log + DISPLAY_MARGIN + line;
+    float_x4 value = vload_float_x4(log + (size_t)n * stride);
+    if (filter->weight > 0) {
+      float_x4 smooth = vset_float_x4(0);
+      for (int t = 0; t < TAPS; ++t) {
+        const size_t at = within((int32_t)n + filter->row[t], echo->samples);
+        const float *p = log + (ptrdiff_t)(at * stride) + filter->line[t];
+        const float_x4 left = vload_float_x4(p), right = vload_float_x4(p + 1);
+        smooth = smooth + bell[t] * (left + filter->next[t] * (right - left));
       }
-      float_x4 first = sum[0] + sum[1] + sum[2], second = sum[1] + sum[2] + sum[3];
-      float_x4 blur = (first + (low - from) * (second - first)) * (1.0f / 9);
-      value = value + sharp * (value - blur);
+      value = value + filter->weight * (smooth - value);
+    }
+    if (sharp > 0) {
+      // The blur between two coarse rows.
+      const float to = ((float)n + 0.5f) / (float)c->every - 0.5f;
+      const float low = between(to, 0, (float)c->rows - 1.001f);
+      const uint32_t from = (uint32_t)low;
+      const float *p = c->blur + (size_t)from * stride + DISPLAY_MARGIN + line;
+      const float_x4 top = vload_float_x4(p), next = vload_float_x4(p + stride);
+      value = value + sharp * (value - (top + (low - (float)from) * (next - top)));
     }
     // A live picture follows changes of more than 20 grey levels at once.
     float *held = echo->held + (size_t)n * echo->padded + line;
-    if (echo->is_held && keep > 0) {
-      float_x4 before = vload_float_x4(held), change = value - before;
-      float_x4 still = vmin_float_x4(
+    if (keep > 0) {
+      const float_x4 before = vload_float_x4(held), change = value - before;
+      const float_x4 still = vmin_float_x4(
           vmax_float_x4(2 - vabs_float_x4(change) * 0.05f, vset_float_x4(0)), vset_float_x4(1));
       value = before + (1 - keep * still) * change;
     }
-    vstore_float_x4(held, value);
+    if (echo->rolling) vstore_float_x4(held, value);
+    const float_x4 shown =
+        vmin_float_x4(vmax_float_x4(value, vset_float_x4(0)), vset_float_x4(255));
+    const int_x4 step = vint_float_x4(shown * (SONDE_MAP_STEPS / 255.0f) + 0.5f);
     float *grey = echo->grey + (size_t)n * echo->padded + line;
-    for (int k = 0; k < BLOCK; ++k) {
-      const float at = fminf(fmaxf(value[k], 0), 255) * (SONDE_MAP_STEPS / 255.0f);
-      const int32_t step = (int32_t)at;
-      grey[k] = echo->map[step] + (at - (float)step) * (echo->map[step + 1] - echo->map[step]);
-    }
+    for (int k = 0; k < BLOCK; ++k) grey[k] = echo->map[step[k]];
   }
 }
 
 void sonde_echo_display(sonde_echo *echo) {
   const frame *f = &echo->frame;
   const sonde_scanner *s = f->scanner;
-  const uint32_t stride = log_stride(echo);
+  coarse c = {.stride = echo->padded + 2 * DISPLAY_MARGIN,
+              .mean = echo->coarse,
+              .blur = echo->blurred,
+              .tensor = echo->tensor,
+              .blocks = echo->padded / BLOCK};
   SONDE_ASSERT(echo->looks > 0 && echo->padded % BLOCK == 0 && echo->log != NULL);
   // The mean of the looks in decibels, beside which the outer lines go on.
   const float range = (float)f->settings.dynamic_range_db;
@@ -121,7 +168,7 @@ void sonde_echo_display(sonde_echo *echo) {
                       .grey_per_db = 255 / range};
   for (uint32_t n = 0; n < echo->samples; ++n) {
     const size_t at = (size_t)n * echo->padded;
-    float *row = echo->log + (size_t)n * stride, *out = row + DISPLAY_MARGIN;
+    float *row = echo->log + (size_t)n * c.stride, *out = row + DISPLAY_MARGIN;
     for (uint32_t k = 0; k < echo->looks; ++k) job.look[k] = echo->look[k] + at;
     job.envelope = echo->envelope + at, job.grey = out;
     echo->kernels->compress(&job);
@@ -129,26 +176,17 @@ void sonde_echo_display(sonde_echo *echo) {
     for (uint32_t l = echo->lines; l < echo->padded + DISPLAY_MARGIN; ++l)
       out[l] = out[echo->lines - 1];
   }
-  // Means of so many samples as a line is wide, on which directions are found.
+  // Means of so many samples as a line is wide, in which directions are found.
   const double wide = f->pitch_m * (f->radius_m > 0 ? 1 + 0.5 * f->depth_m / f->radius_m : 1);
-  const uint32_t every = (uint32_t)clamp(rint(wide / f->step_m), 1, 8);
-  const uint32_t rows = echo->samples / every;
-  const bool coarse = s->filter > 0 || s->sharpening > 0;
-  float *mean = echo->coarse;
-  SONDE_ASSERT(rows >= 4);
-  for (uint32_t row = 0; coarse && row < rows; ++row) {
-    float *out = mean + (size_t)row * stride;
-    const float *in = echo->log + (size_t)row * every * stride, share = 1 / (float)every;
-    memcpy(out, in, stride * sizeof *out);
-    for (uint32_t n = 1; n < every; ++n)
-      for (uint32_t l = 0; l < stride; ++l) out[l] += in[n * stride + l];
-    for (uint32_t l = 0; l < stride; ++l) out[l] *= share;
-  }
-  for (uint32_t row = 0; row < rows; ++row)
-    for (uint32_t line = 0; line < echo->padded; line += BLOCK) {
+  c.every = (uint32_t)clamp(rint(wide / f->step_m), 1, 8);
+  c.rows = echo->samples / c.every;
+  SONDE_ASSERT(c.rows >= 4);
+  if (s->filter > 0 || s->sharpening > 0) make_coarse(echo, &c);
+  for (uint32_t row = 0; row < c.rows; ++row)
+    for (uint32_t block = 0; block < c.blocks; ++block) {
       block_filter filter = {.weight = 0};
-      if (s->filter > 0) filter = find_filter(echo, mean, row, line, every);
-      filter_block(echo, mean, row, line, every, &filter);
+      if (s->filter > 0) filter = find_filter(echo, &c, row, block);
+      filter_block(echo, &c, row, block, &filter);
     }
   echo->is_held = echo->rolling;
 }

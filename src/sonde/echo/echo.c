@@ -109,6 +109,8 @@ static size_t carve(sonde_echo *echo, char *block) {
     }
     CARVE(echo->log, (lines + 2 * DISPLAY_MARGIN) * echo->samples);
     CARVE(echo->coarse, (lines + 2 * DISPLAY_MARGIN) * echo->samples);
+    CARVE(echo->blurred, (lines + 2 * DISPLAY_MARGIN) * echo->samples);
+    CARVE(echo->tensor, image / 4);
     CARVE(echo->held, image);
   }
   CARVE(echo->envelope, image);

@@ -26,7 +26,7 @@ enum {
   // 0.05 m^2, its slab at most 16 mm thick with a cube's width: 100,000 cubes of 2 mm.
   SONDE_MAX_CELLS = 1 << 17,
   SONDE_SLAB_ROWS = 256,  // depths at which the slab's height is tabulated
-  SONDE_MAP_STEPS = 1020, // of the grey map
+  SONDE_MAP_STEPS = 4080, // of the grey map
   DISPLAY_MARGIN = 16,    // columns beside the picture that the filter reads
 };
 
@@ -165,11 +165,13 @@ struct sonde_echo {
   float *grey;          // [samples][padded]
 
   // The display (display_hot.c).
-  float *log;    // [samples][padded + 2 DISPLAY_MARGIN] grey before the filter, edges repeated
-  float *coarse; // [samples][padded + 2 DISPLAY_MARGIN] means over some rows of it
-  float *held;   // [samples][padded] the picture before, for persistence
-  bool is_held;  // there is one
-  float map[SONDE_MAP_STEPS + 2]; // grey values of the scanner's map
+  float *log;         // [samples][padded + 2 DISPLAY_MARGIN] grey before the filter, edges repeated
+  float *coarse;      // [samples][padded + 2 DISPLAY_MARGIN] means over some rows of it
+  float *blurred;     // [samples][padded + 2 DISPLAY_MARGIN] means of 3 x 3 of these
+  float (*tensor)[3]; // [samples][padded / 4] of their slopes
+  float *held;        // [samples][padded] the picture before, for persistence
+  bool is_held;       // there is one
+  float map[SONDE_MAP_STEPS + 1]; // grey values of the scanner's map
 };
 
 // Tables of scatterers, streamlines and noise of a new renderer.

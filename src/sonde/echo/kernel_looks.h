@@ -15,7 +15,7 @@ enum {
 };
 
 // Side lobes: what neighbours send into a column, a fixed pattern.
-enum { HAZE_TAPS = 9, HAZE_REACH = 16 }; // lines
+enum { HAZE_TAPS = 7, HAZE_REACH = 16 }; // lines
 typedef struct haze_taps {
   int32_t offset[HAZE_TAPS]; // lines
   float re[HAZE_TAPS], im[HAZE_TAPS];

@@ -57,10 +57,14 @@ INLINE floats pixel_between(const convert_job *job, const float *mixed, bool clo
   line = vonly(in, line);
   ints l = vint(line);
   floats a = line - vreal(l), p, q;
-  if (job->cubic)
-    return vonly(in, cubic(a, vgather(mixed - 1, l), vgather(mixed, l), vgather(mixed + 1, l),
-                           vgather(mixed + 2, l)) +
-                         0.5f);
+  if (job->cubic) {
+    floats value[4];
+    const int32_t from = in[0] ? l[0] : 0;
+    const ints at = in & (l - from);
+    for (int k = 0; k < 4; ++k)
+      value[k] = close ? vlook_up(mixed + from + k - 1, at) : vgather(mixed + k - 1, l);
+    return vonly(in, cubic(a, value[0], value[1], value[2], value[3]) + 0.5f);
+  }
   if (close) {
     const int32_t from = in[0] ? l[0] : 0;
     const ints at = in & (l - from);

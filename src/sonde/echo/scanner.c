@@ -78,8 +78,8 @@ sonde_status sonde_scanner_take(sonde_echo *echo, const sonde_scanner *scanner,
   echo->looks = (uint32_t)(echo->scanner.looks + 0.5);
   // The grey map: a power, mixed with a smooth step, which has more contrast in the middle.
   const double knee = echo->scanner.map_knee;
-  for (int k = 0; k <= SONDE_MAP_STEPS + 1; ++k) {
-    const double x = fmin((double)k / SONDE_MAP_STEPS, 1);
+  for (int k = 0; k <= SONDE_MAP_STEPS; ++k) {
+    const double x = (double)k / SONDE_MAP_STEPS;
     echo->map[k] =
         (float)(255 * ((1 - knee) * pow(x, echo->scanner.map_gamma) + knee * x * x * (3 - 2 * x)));
   }
