@@ -93,8 +93,9 @@ static int check(const options *a, const exam_library *library, const sonde_case
   if (!a->json) {
     printf("%s: %s (%s), %s\n", file, c->id, sonde_case_level_name(c->level), c->diagnosis);
     for (uint32_t i = 0; i < map->segment_count; ++i)
-      printf("  %-18s z %.0f to %.0f mm\n", map->segment[i].name, 1e3 * map->segment[i].from_m,
-             1e3 * map->segment[i].to_m);
+      printf("  %-18s z %.0f to %.0f mm, %s\n", map->segment[i].name, 1e3 * map->segment[i].from_m,
+             1e3 * map->segment[i].to_m,
+             sonde_decision_name(sonde_case_truth(c, map->segment[i].name)));
   } else {
     app_json_begin();
     app_json_text("file", file);
@@ -104,8 +105,9 @@ static int check(const options *a, const exam_library *library, const sonde_case
     app_json_text("diagnosis", c->diagnosis);
     app_json_real("vein_mm", 1e3 * map->length_m);
     app_json_object("segments");
-    for (uint32_t i = 0; i < c->truth_count; ++i)
-      app_json_text(c->truth_segment[i], sonde_decision_name(c->truth[i]));
+    for (uint32_t i = 0; i < map->segment_count; ++i)
+      app_json_text(map->segment[i].name,
+                    sonde_decision_name(sonde_case_truth(c, map->segment[i].name)));
     app_json_close();
     app_json_end();
   }

@@ -19,7 +19,8 @@ static const options DEFAULTS = {
 
 static const app_option TABLE[] = {
     OPT_TEXT(patient, "case", "ID|FILE", "a case that ships, see sonde-cases(1), or a case file"),
-    OPT_TEXT(protocol, "protocol", "P", "two_point, three_point, extended, or a protocol file"),
+    OPT_TEXT(protocol, "protocol", "P",
+             "two_point, three_point, extended, whole_leg, or a protocol file"),
     OPT_TEXT(operator_name, "operator", "NAME", "expert, novice, timid or forceful"),
     OPT_INTEGER(seed, "seed", "N", 0, 4294967295L, "of the operator's hand"),
     OPT_FLAG(compare, "compare",
@@ -58,6 +59,7 @@ static void print_text(const sonde_case *patient, const sonde_score *s) {
   for (uint32_t i = 0; i < s->segment_count; ++i) {
     const sonde_segment_verdict *v = &s->segment[i];
     const char *decision = sonde_decision_name(v->decision);
+    if (v->kind != SONDE_SEGMENT_MAIN && !v->needed) continue;
     printf("%-18s %6u %6u  %-13s %-13s%s\n", v->name, v->points, v->done,
            decision[0] ? decision : "-", sonde_decision_name(v->truth),
            v->correct || !v->needed ? "" : " wrong");

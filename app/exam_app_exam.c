@@ -114,7 +114,7 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
 // ---- watching
 
 // Means of 2 x 2 pixels.
-static void keep_picture(const sonde_frame *frame, exam_picture *picture) {
+static void keep_picture(const sonde_frame *frame, double vein, exam_picture *picture) {
   assert(frame->pixels && frame->width > 1 && frame->height > 1);
   sonde_image *image = &picture->image;
   if (!image->pixels &&
@@ -129,7 +129,7 @@ static void keep_picture(const sonde_frame *frame, exam_picture *picture) {
   image->width_m = frame->width_m;
   image->height_m = frame->height_m;
   image->tick = frame->snapshot.tick;
-  picture->vein_ratio = frame->snapshot.vein_area_ratio;
+  picture->vein_ratio = vein;
 }
 
 void exam_observe(exam *of, const sonde_frame *frame) {
@@ -152,18 +152,19 @@ void exam_observe(exam *of, const sonde_frame *frame) {
   }
 
   // The open vein is pictured as long as nothing presses, the closed one whenever it gets smaller.
-  bool pressing = sonde_judge_state(of->judge).state != SONDE_PRESS_STATE_NONE;
-  if (isfinite(s->vein_area_ratio) && !pressing) {
-    keep_picture(frame, &of->open);
+  sonde_judge_now now = sonde_judge_state(of->judge);
+  bool pressing = now.state != SONDE_PRESS_STATE_NONE;
+  if (isfinite(now.vein_ratio) && !pressing) {
+    keep_picture(frame, now.vein_ratio, &of->open);
     of->closed.vein_ratio = INFINITY;
-  } else if (isfinite(s->vein_area_ratio) && s->vein_area_ratio < of->closed.vein_ratio) {
-    keep_picture(frame, &of->closed);
+  } else if (isfinite(now.vein_ratio) && now.vein_ratio < of->closed.vein_ratio) {
+    keep_picture(frame, now.vein_ratio, &of->closed);
   }
 
   // Force and area of the vein, ten times a second.
   if (n == EXAM_SAMPLES || (n && s->time_s - of->sample[n - 1].time_s < 0.1)) return;
   of->sample[of->sample_count++] =
-      (sonde_exam_sample){s->time_s, s->force_normal_n, s->vein_area_ratio};
+      (sonde_exam_sample){s->time_s, s->force_normal_n, now.vein_ratio};
 }
 
 // ---- the end

@@ -135,6 +135,7 @@ static void put_findings(sonde_json_out *out, const exam *of, bool shown) {
   sonde_json_begin_list(out, "segments");
   for (uint32_t i = 0; i < map->segment_count; ++i) {
     sonde_segment_status status = sonde_judge_segment(of->judge, i);
+    if (map->segment[i].kind != SONDE_SEGMENT_MAIN && !status.needed) continue;
     sonde_json_begin_object(out, NULL);
     sonde_json_put_text(out, "id", map->segment[i].name);
     sonde_json_put_text(out, "title", sonde_segment_title(map->segment[i].name));

@@ -72,6 +72,15 @@ typedef struct sonde_session_def {
 /** Healthy vein, first probe, default limits and world, no gel, constant pressures. @thread any */
 SONDE_API sonde_session_def sonde_session_def_default(void);
 
+enum { SONDE_VEIN_CROSSINGS = 24 };
+/** Where the image plane cuts a vein beside the main one. */
+typedef struct sonde_vein_crossing {
+  uint32_t vessel;   /**< index of sonde_interior_vessel_name() */
+  double area_ratio; /**< current / rest */
+  double aside_m;    /**< from the beam axis, along the probe's x */
+  sonde_vec3 rest_m; /**< on its course at rest */
+} sonde_vein_crossing;
+
 /** Everything a viewer shows of one tick; copied as a whole through a mailbox. */
 typedef struct sonde_snapshot {
   uint64_t tick;
@@ -85,13 +94,17 @@ typedef struct sonde_snapshot {
                                     negative above the skin */
   double contact_volume_m3, contact_area_m2;
   double vein_area_ratio, artery_area_ratio; /**< at the image plane; NaN when not in view */
-  double other_vein_ratio; /**< of a second femoral vein there; NaN when none is */
+  double other_vein_ratio; /**< greatest of a second or third femoral and a second popliteal vein
+                                there; NaN when none is */
   double vein_short_m;     /**< AP diameter */
   sonde_vec3 vein_rest_m;  /**< where the image plane cuts the vein, on its course at rest; NaN when
                                 not in view */
   double vein_tilt_rad;    /**< between the vein and the normal of the image plane, 0: transverse */
-  double gel_volume_m3;    /**< on the skin; NaN while the controls' gel is off */
-  double gel_coupling;     /**< mean over the lines of the image, 0..1; likewise */
+  uint32_t crossing_count;
+  sonde_vein_crossing crossing[SONDE_VEIN_CROSSINGS]; /**< [crossing_count] other veins, in the
+                                                         order of the vessels */
+  double gel_volume_m3; /**< on the skin; NaN while the controls' gel is off */
+  double gel_coupling;  /**< mean over the lines of the image, 0..1; likewise */
   double venous_pressure_pa, arterial_pressure_pa; /**< in the vessels */
   uint32_t awake_nodes, solver_iterations, flags;
   uint32_t restores; /**< times the probe was taken off and the skin restored to rest, because the

@@ -16,7 +16,7 @@ extern "C" {
 
 typedef enum sonde_sex { SONDE_SEX_DRAWN, SONDE_SEX_FEMALE, SONDE_SEX_MALE } sonde_sex;
 
-enum { SONDE_BRANCHES = 64, SONDE_LANDMARKS = 16, SONDE_SEGMENTS = 8, SONDE_LEVELS = 64 };
+enum { SONDE_BRANCHES = 64, SONDE_LANDMARKS = 16, SONDE_SEGMENTS = 16, SONDE_LEVELS = 64 };
 
 typedef enum sonde_vessel_kind { SONDE_VESSEL_VEIN, SONDE_VESSEL_ARTERY } sonde_vessel_kind;
 

@@ -28,11 +28,48 @@ typedef struct sonde_vein_point {
   double radius_m, depth_m;
 } sonde_vein_point;
 
-/** Course and segments of the femoral vein; nothing of a case's pathology. Plain data. */
+/** What a clot in a segment means. */
+typedef enum sonde_segment_kind {
+  SONDE_SEGMENT_MAIN,       /**< common femoral to popliteal: proximal deep vein thrombosis */
+  SONDE_SEGMENT_DEEP,       /**< another proximal deep vein: likewise */
+  SONDE_SEGMENT_CALF,       /**< a deep or muscle vein below the knee: distal thrombosis */
+  SONDE_SEGMENT_SUPERFICIAL /**< saphenous: no deep vein thrombosis */
+} sonde_segment_kind;
+
+enum { SONDE_SEGMENT_VEINS = 4 };
+/** Veins that get one finding: a stretch of the main vein, or branches beside it. */
+typedef struct sonde_exam_segment {
+  char name[32];
+  double from_m, to_m; /**< model z; of branches: that they reach */
+  sonde_segment_kind kind;
+  uint32_t vein_count;                /**< 0: of the main vein */
+  uint32_t vein[SONDE_SEGMENT_VEINS]; /**< as sonde_vein_crossing.vessel; of a pair both */
+} sonde_exam_segment;
+
+/** A station of the limb: where a probe is put. */
+typedef struct sonde_map_station {
+  char name[32];
+  const char *text; /**< landmarks that must be seen, static; NULL: of a thigh */
+  uint32_t segment; /**< that it examines unless a protocol says another one */
+  sonde_pose probe; /**< on the skin, transverse, +z into the tissue */
+  /** [segment] where its plane cuts the first of a segment's veins under the face (NaN: nowhere),
+   * slid by slide_m along the leg, towards the foot, until it does. */
+  sonde_vec3 vein_m[SONDE_SEGMENTS];
+  double slide_m[SONDE_SEGMENTS];
+} sonde_map_station;
+
+enum { SONDE_MAP_MIDDLES = 32 };
+
+/** Course and segments of the veins; nothing of a case's pathology. Plain data. */
 typedef struct sonde_vein_map {
-  uint32_t segment_count, point_count, branch_count;
-  sonde_segment segment[SONDE_SEGMENTS]; /**< from the groin to the knee */
-  char branch[SONDE_BRANCHES][32];       /**< names of the vessels beside the femoral ones */
+  uint32_t segment_count, point_count, branch_count, station_count;
+  sonde_exam_segment
+      segment[SONDE_SEGMENTS];     /**< of the main vein from groin to knee, then others */
+  char branch[SONDE_BRANCHES][32]; /**< names of the vessels beside the femoral ones */
+  sonde_map_station station[SONDE_LANDMARKS]; /**< of a limb, from groin to calf */
+  /** Middle of the leg at equal steps of z from middle_z_m[0] to [1]; all 0: not known. */
+  sonde_vec3 middle_m[SONDE_MAP_MIDDLES];
+  double middle_z_m[2];
   uint32_t landmark_count;
   char landmark[SONDE_LANDMARKS][32]; /**< names of the model's landmarks */
   double landmark_z_m[SONDE_LANDMARKS];
@@ -51,29 +88,39 @@ SONDE_API sonde_vein_point sonde_vein_at(const sonde_vein_map *map, double along
 SONDE_API double sonde_vein_along(const sonde_vein_map *map, double z_m);
 /** Whether the thigh has a branch of that name. @thread any */
 SONDE_API bool sonde_vein_has_branch(const sonde_vein_map *map, const char *name);
-/** Index of a segment by name or of the one at a model z; SONDE_SEGMENTS when there is none.
- *  @thread any */
+/** Index of a segment by name, or of the main vein's at a model z; SONDE_SEGMENTS when there is
+ * none. @thread any */
 SONDE_API uint32_t sonde_vein_segment(const sonde_vein_map *map, const char *name);
 SONDE_API uint32_t sonde_vein_segment_at(const sonde_vein_map *map, double z_m); /**< @thread any */
 /** Title of a segment for people, e.g. "Common femoral vein". @thread any */
 SONDE_API const char *sonde_segment_title(const char *name);
 
-/** A place in a file: a share of a segment, a landmark, or (both empty) millimetres from the groin
- *  end. */
+/** A place in a file: a station, a share of a segment, a landmark, a share of the branch that the
+ *  file speaks of, or (all empty) millimetres from the groin end. */
 typedef struct sonde_station {
   char segment[32], landmark[32];
-  double share;   /**< 0 at the groin end of the segment, 1 at the other */
-  double shift_m; /**< added, towards the knee */
+  char
+      station[32]; /**< of the limb (docs/limb_model.md); on a thigh where its vein has the place */
+  bool of_branch;  /**< share and shift_m count along a branch from its proximal end */
+  double share;    /**< 0 at the groin end of the segment, 1 at the other */
+  double shift_m;  /**< added, towards the knee */
 } sonde_station;
 
-/** @return NOT_FOUND for a segment or landmark that the thigh has not; ARGUMENT beyond the vein
- * @thread any */
+/** Where a place of the main vein is.
+ * @return NOT_FOUND for a station, segment or landmark that the thigh has not, or a station of
+ * another vein; ARGUMENT beyond the vein @thread any */
 SONDE_API sonde_status sonde_station_find(const sonde_station *station, const sonde_vein_map *map,
                                           double *along_m, sonde_error *error);
 
+/** How open the veins of a segment are in a snapshot: the greatest area ratio of those under the
+ *  face; NaN when none is in view.
+ *  @param[out] rest_m where the plane cuts the first of them; may be NULL @thread any */
+SONDE_API double sonde_segment_ratio(const sonde_vein_map *map, uint32_t segment,
+                                     const sonde_snapshot *snapshot, sonde_vec3 *rest_m);
+
 /* ---- cases -------------------------------------------------------------------------------- */
 
-enum { SONDE_CASE_VERSION = 2, SONDE_LOOK_ALIKES = 4 };
+enum { SONDE_CASE_VERSION = 3, SONDE_LOOK_ALIKES = 4 };
 
 typedef enum sonde_case_level {
   SONDE_CASE_FIRST,
@@ -143,7 +190,7 @@ typedef struct sonde_case {
   uint32_t truth_count;
   char truth_segment[SONDE_SEGMENTS][32];
   sonde_decision truth[SONDE_SEGMENTS]; /**< compressible or clot */
-  bool thrombosis;                      /**< of a deep vein: the overall diagnosis */
+  bool thrombosis;                      /**< of a deep vein, of the calf too: the diagnosis */
   char diagnosis[160];                  /**< in words */
   uint32_t look_alike_count;
   char look_alike[SONDE_LOOK_ALIKES][48];
@@ -162,6 +209,8 @@ SONDE_API sonde_status sonde_case_save(const sonde_case *from, const char *path,
                                        sonde_error *error);
 /** The text of such a file. @param[out] text freed by sonde_free() @thread owner */
 SONDE_API sonde_status sonde_case_text(const sonde_case *from, char **text, sonde_error *error);
+/** What the case says of a segment, else what its findings put into the branches. @thread any */
+SONDE_API sonde_decision sonde_case_truth(const sonde_case *of, const char *segment);
 /** All *.yaml of a directory, by level, then title. @param cases [*count] freed by sonde_free
  *  @return what the first unreadable file says; ARGUMENT for an id that is there twice
  *  @thread owner */

@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-enum { SONDE_SCORE_VERSION = 3, SONDE_COMPRESSIONS = 4096, SONDE_HINT_S = 10 };
+enum { SONDE_SCORE_VERSION = 4, SONDE_COMPRESSIONS = 4096, SONDE_HINT_S = 10 };
 
 typedef enum sonde_press_result {
   SONDE_PRESS_COMPLETE,     /**< walls touch, transverse, not too hard */
@@ -32,7 +32,9 @@ typedef struct sonde_compression {
   uint32_t segment;    /**< of the map; SONDE_SEGMENTS when the vein was not in view */
   uint32_t point;      /**< nearest of the plan within reach; SONDE_PLAN_POINTS: none */
   uint32_t place;      /**< nearest of the plan, in reach or not: its force target applies */
-  double z_m, along_m; /**< where the image plane cut the vein when it began */
+  uint64_t examined;   /**< a bit per place of the plan that it examined */
+  double z_m, along_m; /**< where the image plane cut the vein when it began; along the main vein,
+                            NaN when the press shows nothing of that one */
   double force_peak_n;
   double vein_ratio, artery_ratio; /**< least of the vein; the artery's at the same time */
   double artery_least;
@@ -72,7 +74,7 @@ SONDE_API const sonde_compression *sonde_judge_compressions(const sonde_judge *j
 /** The press under way, or nothing. */
 typedef struct sonde_judge_now {
   sonde_press_state state;
-  double vein_ratio, artery_ratio; /**< NaN when not in view */
+  double vein_ratio, artery_ratio; /**< of the place at the probe; NaN when not in view */
   double force_n, time_s;
 } sonde_judge_now;
 SONDE_API sonde_judge_now sonde_judge_state(const sonde_judge *judge); /**< @thread owner */
@@ -131,6 +133,7 @@ typedef struct sonde_segment_verdict {
   bool needed;
   sonde_decision decision, truth;
   bool correct, supported; /**< by a press of the right kind */
+  sonde_segment_kind kind;
   double from_m, to_m;
   uint32_t points, done;
 } sonde_segment_verdict;

@@ -44,8 +44,8 @@ typedef struct sonde_exam_def {
   const char *bundled;       /**< path of the bundled model */
   const char *directory;     /**< of the case file, for model paths */
   double limit_s;            /**< of simulated time; default 1200 */
-  bool solid;                /**< the inside by finite elements, as in real time; default
-                                  columns: half the time, ratios within 0.06 */
+  bool solid;                /**< the inside by finite elements, as in real time and always in a
+                                  limb; default columns: ratios within 0.06 in a thigh */
   const char *json_path, *csv_path; /**< NULL: not written */
 } sonde_exam_def;
 SONDE_API sonde_exam_def sonde_exam_def_default(void); /**< @thread any */

@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-enum { SONDE_EXAM_PROTOCOL_VERSION = 1, SONDE_EXAM_STOPS = 16, SONDE_PLAN_POINTS = 64 };
+enum { SONDE_EXAM_PROTOCOL_VERSION = 1, SONDE_EXAM_STOPS = 32, SONDE_PLAN_POINTS = 64 };
 
 /** What a valid compression is (docs/trainer_theory.md). The forces are those of a place:
  *  sonde_force_target. */
@@ -36,7 +36,8 @@ SONDE_API sonde_force_target sonde_force_target_make(double closes_n);
 /** One place, or places every so often between two. */
 typedef struct sonde_exam_stop {
   char title[64], text[256];
-  char needs[32]; /**< branch of the thigh without which the place is left out; empty: none */
+  char needs[32];   /**< branch of the thigh without which the place is left out; empty: none */
+  char segment[32]; /**< whose finding a station is for; empty: the station's own */
   sonde_station from, to;
   double every_m; /**< 0: one place, `from` */
 } sonde_exam_stop;
@@ -61,8 +62,9 @@ SONDE_API sonde_status sonde_exam_protocol_list(const char *directory,
 /** A place of the exam on one thigh. */
 typedef struct sonde_plan_point {
   char title[64], text[256];
-  uint32_t segment; /**< of the map */
-  sonde_vein_point at;
+  uint32_t segment;    /**< of the map: its veins must close */
+  bool station;        /**< of the limb: the probe stands as there, not straight above the vein */
+  sonde_vein_point at; /**< of another vein than the main one without along_m (NaN) */
   sonde_force_target target; /**< NaN before sonde_plan_find_targets() */
 } sonde_plan_point;
 
@@ -75,8 +77,8 @@ typedef struct sonde_plan {
 
 /** The places, without their forces. A place that needs a branch which the thigh has not is left
  *  out.
- *  @return NOT_FOUND for a place that the thigh has not; ARGUMENT for more than SONDE_PLAN_POINTS
- * or none at all
+ *  @return NOT_FOUND for a place or a vein there that the leg has not; ARGUMENT for more than
+ * SONDE_PLAN_POINTS or none at all
  *  @thread any */
 SONDE_API sonde_status sonde_plan_make(const sonde_exam_protocol *protocol,
                                        const sonde_vein_map *map, sonde_plan *plan,
@@ -84,7 +86,8 @@ SONDE_API sonde_status sonde_plan_make(const sonde_exam_protocol *protocol,
 
 /** Finds the force of every place by pressing a healthy vein there: the case's thigh, posture and
  *  oedema, the linear probe straight above the vein at 12 mm/s, the inside by finite elements as in
- * a session; no clot, breath or strain. About 0.3 s of a core's time for each place.
+ * a session; no clot, breath or strain. Places of one station share the force that closes the veins
+ * of all of them. About 0.3 s of a core's time for each place.
  *  @param setup of the case whose map the plan was made with
  *  @return MISMATCH for a place where the healthy vein does not close at 60 N, or 60 mm deep;
  *    CANCELLED; MEMORY @thread owner */

@@ -194,7 +194,7 @@ eval "exec ${HOLDER[1]}>&-"
 # Cases and exams.
 rejects '--case is missing' exam
 rejects "no case 'nobody'" exam --case nobody
-rejects "no protocol 'all', expected two_point, three_point, extended" exam --case healthy-lean --protocol all
+rejects "no protocol 'all', expected two_point, three_point, whole_leg, extended" exam --case healthy-lean --protocol all
 rejects "no operator 'surgeon'" exam --case healthy-lean --operator surgeon
 rejects 'from 1 to 100' exam --compare --seeds 0
 rejects 'no such' exam --case ./absent.yaml

@@ -153,29 +153,6 @@ static void findings_are_placed(void **state) {
   assert_non_null(strstr(error.message, "jugular"));
 }
 
-// The probe's place above every point of the vein looks at the vein.
-static void the_map_looks_at_the_vein(void **state) {
-  (void)state;
-  sonde_case c;
-  sonde_case_setup setup;
-  assert_int_equal(sonde_case_parse(GOOD, "one.yaml", &c, NULL), SONDE_OK);
-  assert_int_equal(build(&c, &setup, NULL), SONDE_OK);
-  const sonde_vein_map *map = &setup.map;
-  for (uint32_t k = 0; k < map->point_count; ++k) {
-    const sonde_vein_point *p = &map->point[k];
-    sonde_vec3 beam = v_madd(p->skin_m, -p->depth_m, p->normal);
-    assert_true(v_distance(beam, p->vein_m) < 1e-6);
-    assert_near(v_dot(p->normal, p->across), 0, 1e-9);
-    assert_near(v_norm(p->across), 1, 1e-9);
-    assert_near(sonde_vein_along(map, p->z_m), p->along_m, 1e-9);
-    assert_true(p->depth_m > 0.008 && p->depth_m < 0.06);
-    if (k > 0) assert_true(v_dot(p->across, map->point[k - 1].across) > 0.9);
-  }
-  for (uint32_t i = 1; i < map->segment_count; ++i)
-    assert_near(map->segment[i].from_m, map->segment[i - 1].to_m, 1e-9);
-  sonde_case_setup_clear(&setup);
-}
-
 static void same_case(const sonde_case *a, const sonde_case *b) {
   assert_string_equal(a->id, b->id);
   assert_string_equal(a->history, b->history);
@@ -200,6 +177,94 @@ static void same_case(const sonde_case *a, const sonde_case *b) {
   assert_int_equal(a->thigh, b->thigh);
   assert_int_equal(a->leg.side, b->leg.side);
   if (isfinite(a->leg.bmi)) assert_near(a->leg.bmi, b->leg.bmi, 1e-9);
+}
+
+// A clot of a branch is where the file says, as a share of the branch; what the truth does not name
+// follows from it, and what it names must fit. Deep ones are a thrombosis, superficial ones not.
+static void a_branch_has_its_own_truth(void **state) {
+  (void)state;
+  static const char *const FINDING =
+      "findings:\n  branches:\n  - {branch: %s, stage: acute_occlusive, from: {share: 0.25}, to: "
+      "{share: 0.5}}\ntruth:\n  thrombosis: %s\n  diagnosis: D\n  segments: {common_femoral: "
+      "compressible, femoral_proximal: compressible, femoral_mid: compressible, femoral_distal: "
+      "compressible, popliteal: compressible%s}\n";
+  static const struct {
+    const char *branch, *thrombosis, *named, *says;
+  } TRY[] = {{"posterior_tibial_vein", "true", "", NULL},
+             {"posterior_tibial_vein", "true", ", posterior_tibial: clot", NULL},
+             {"posterior_tibial_vein", "false", "", "a segment is clot"},
+             {"great_saphenous", "false", ", great_saphenous: clot", NULL},
+             {"great_saphenous", "true", "", "no deep segment is clot"},
+             {"posterior_tibial_vein", "true", ", peroneal: clot", "peroneal clot, but 0"}};
+  for (size_t i = 0; i < SONDE_COUNT_OF(TRY); ++i) {
+    char text[1024], finding[800];
+    snprintf(finding, sizeof finding, FINDING, TRY[i].branch, TRY[i].thrombosis, TRY[i].named);
+    snprintf(text, sizeof text,
+             "sonde_case: 3\nid: b\ntitle: B\nlevel: hard\nhistory: h\nleg: {seed: 3, sex: male, "
+             "bmi: 24}\n%s",
+             finding);
+    sonde_case c, back;
+    sonde_case_setup setup = {0};
+    sonde_error error = {0};
+    char *written = NULL;
+    sonde_status status = sonde_case_parse(text, "b.yaml", &c, &error);
+    if (!status && (i == 0 || TRY[i].says)) status = build(&c, &setup, &error);
+    if (TRY[i].says) {
+      assert_int_equal(status, SONDE_MISMATCH);
+      if (!strstr(error.message, TRY[i].says)) fail_msg("%s", error.message);
+      continue;
+    }
+    if (status) fail_msg("%s", error.message);
+    bool deep = strcmp(TRY[i].thrombosis, "true") == 0;
+    assert_int_equal(sonde_case_truth(&c, "posterior_tibial"),
+                     deep ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE);
+    assert_int_equal(sonde_case_truth(&c, "great_saphenous"),
+                     deep ? SONDE_DECISION_COMPRESSIBLE : SONDE_DECISION_CLOT);
+    assert_int_equal(sonde_case_text(&c, &written, NULL), SONDE_OK);
+    assert_int_equal(sonde_case_parse(written, "again", &back, &error), SONDE_OK);
+    same_case(&c, &back);
+    assert_memory_equal(&c.branch[0].extent, &back.branch[0].extent, sizeof c.branch[0].extent);
+    sonde_free(written);
+    if (i > 0) continue;
+    // A quarter of the branch: the lengths of its pieces with both ends in the stretch.
+    const sonde_pathology *p = &setup.findings.branch[0].pathology;
+    uint32_t segment = sonde_vein_segment(&setup.map, "posterior_tibial");
+    const sonde_vessel *line =
+        &setup.model->anatomy->branch[setup.map.segment[segment].vein[0] - 2].line;
+    double all_m = 0, filled_m = 0;
+    for (uint32_t k = 1; k < line->count; ++k) {
+      sonde_vec3 a = line->point[k - 1].centre_m, b = line->point[k].centre_m;
+      double middle_z = 0.5 * (a.z + b.z);
+      all_m += v_distance(a, b);
+      if (middle_z > p->thrombus_from_m && middle_z < p->thrombus_to_m)
+        filled_m += v_distance(a, b);
+    }
+    assert_near(filled_m / all_m, 0.25, 0.02);
+    sonde_case_setup_clear(&setup);
+  }
+}
+
+// The probe's place above every point of the vein looks at the vein.
+static void the_map_looks_at_the_vein(void **state) {
+  (void)state;
+  sonde_case c;
+  sonde_case_setup setup;
+  assert_int_equal(sonde_case_parse(GOOD, "one.yaml", &c, NULL), SONDE_OK);
+  assert_int_equal(build(&c, &setup, NULL), SONDE_OK);
+  const sonde_vein_map *map = &setup.map;
+  for (uint32_t k = 0; k < map->point_count; ++k) {
+    const sonde_vein_point *p = &map->point[k];
+    sonde_vec3 beam = v_madd(p->skin_m, -p->depth_m, p->normal);
+    assert_true(v_distance(beam, p->vein_m) < 1e-6);
+    assert_near(v_dot(p->normal, p->across), 0, 1e-9);
+    assert_near(v_norm(p->across), 1, 1e-9);
+    assert_near(sonde_vein_along(map, p->z_m), p->along_m, 1e-9);
+    assert_true(p->depth_m > 0.008 && p->depth_m < 0.06);
+    if (k > 0) assert_true(v_dot(p->across, map->point[k - 1].across) > 0.9);
+  }
+  for (uint32_t i = 1; i < map->segment_count && map->segment[i].vein_count == 0; ++i)
+    assert_near(map->segment[i].from_m, map->segment[i - 1].to_m, 1e-9);
+  sonde_case_setup_clear(&setup);
 }
 
 static void save_and_load_again(const sonde_case *c) {
@@ -254,6 +319,27 @@ static void check_texts(const sonde_case *c, const sonde_vein_map *map) {
   }
 }
 
+// At a station the probe stands on the skin and the first vein of the segment lies in its plane,
+// under the face.
+static void the_place_shows_its_vein(const sonde_plan_point *p, const sonde_case_setup *setup) {
+  if (!p->station) return;
+  sonde_vec3 z = v_neg(p->at.normal), y = v_cross(z, p->at.across);
+  sonde_vec3 to = v_sub(p->at.vein_m, p->at.skin_m);
+  assert_near(v_dot(to, y), 0, 1e-9);
+  assert_true(fabs(v_dot(to, p->at.across)) <= 0.025 && v_dot(to, z) > 0.002 && v_dot(to, z) < 0.1);
+  const sonde_exam_segment *segment = &setup->map.segment[p->segment];
+  const sonde_vessel *line = segment->vein_count
+                                 ? &setup->model->anatomy->branch[segment->vein[0] - 2].line
+                                 : &setup->model->vein;
+  double nearest = INFINITY; // to the line of the first vein, or of its double
+  for (uint32_t v = 0; v < (segment->vein_count ? segment->vein_count : 1); ++v) {
+    if (segment->vein_count) line = &setup->model->anatomy->branch[segment->vein[v] - 2].line;
+    for (uint32_t i = 0; i < line->count; ++i)
+      nearest = fmin(nearest, v_distance(line->point[i].centre_m, p->at.vein_m));
+  }
+  assert_true(nearest < 0.01);
+}
+
 // Each has a leg of its own, is built, and has every place of every protocol.
 static void the_cases_that_ship_are_good(void **state) {
   (void)state;
@@ -280,6 +366,7 @@ static void the_cases_that_ship_are_good(void **state) {
     for (uint32_t k = 0; k < ways; ++k) {
       sonde_plan plan = plan_of(&protocols[k], &setup.map);
       assert_true(plan.count >= protocols[k].stop_count);
+      for (uint32_t n = 0; n < plan.count; ++n) the_place_shows_its_vein(&plan.point[n], &setup);
     }
     sonde_case_setup_clear(&setup);
   }
@@ -295,6 +382,7 @@ int main(void) {
       cmocka_unit_test(mistakes_are_named_with_their_line),
       cmocka_unit_test(the_truth_must_fit),
       cmocka_unit_test(findings_are_placed),
+      cmocka_unit_test(a_branch_has_its_own_truth),
       cmocka_unit_test(the_map_looks_at_the_vein),
       cmocka_unit_test(drawn_cases_are_good),
       cmocka_unit_test(the_cases_that_ship_are_good),

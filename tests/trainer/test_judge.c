@@ -107,6 +107,96 @@ static void a_double_vein_is_closed_when_both_are(void **state) {
   }
 }
 
+// A press at the station of branched_map(), the three other veins left as open as `left`.
+static void feed_cuts(sonde_judge *judge, const test_press *p, double start_s, const double left[3],
+                      const double aside_m[3]) {
+  for (double t = 0; t < 2.4; t += 0.03) {
+    sonde_snapshot s = press_at(p, start_s, start_s + t);
+    double share = fmax(0, 1 - fabs(t - 1));
+    s.crossing_count = 3;
+    for (uint32_t k = 0; k < 3; ++k)
+      s.crossing[k] = (sonde_vein_crossing){.vessel = 2 + k,
+                                            .area_ratio = 1 - share * (1 - left[k]),
+                                            .aside_m = aside_m[k],
+                                            .rest_m = vec3(0.05, 0.003 * k, p->z_m)};
+    assert_true(sonde_judge_feed(judge, &s));
+  }
+}
+
+static sonde_plan station_plan(const sonde_vein_map *map, const char *segment) {
+  char text[400];
+  snprintf(
+      text, sizeof text,
+      "{sonde_protocol: 1, id: s, title: S, text: s, places: [{title: A, at: {station: pair}}, "
+      "{title: B, at: {station: pair}, segment: %s}]}",
+      segment);
+  sonde_exam_protocol protocol = protocol_of(text);
+  return plan_of(&protocol, map);
+}
+
+// A pair closes when both veins have; one that is not in the picture is not asked for. The vein of
+// the other place is examined by the same press, each by its own area.
+static void each_vein_of_a_pair_closes(void **state) {
+  (void)state;
+  const struct {
+    double main, left[3], aside_m[3];
+    sonde_press_result result;
+    uint32_t closed, open; // of the pair
+  } TRY[] = {{0.02, {0.03, 0.05, 1}, {0, 0.006, 0.01}, SONDE_PRESS_COMPLETE, 1, 0},
+             {0.02, {0.03, 0.80, 1}, {0, 0.006, 0.01}, SONDE_PRESS_OPEN, 0, 1},
+             {0.02, {0.80, 0.03, 1}, {0, 0.006, 0.01}, SONDE_PRESS_OPEN, 0, 1},
+             {0.02, {0.03, 0.80, 1}, {0, 0.030, 0.01}, SONDE_PRESS_COMPLETE, 1, 0},
+             {0.02, {0.20, 0.20, 1}, {0, 0.006, 0.01}, SONDE_PRESS_COMPLETE, 0, 0},
+             {0.20, {0.03, 0.05, 1}, {0, 0.006, 0.01}, SONDE_PRESS_COMPLETE, 1, 0}};
+  sonde_vein_map map = branched_map();
+  sonde_plan plan = station_plan(&map, "posterior_tibial");
+  assert_int_equal(plan.point[0].segment, 3);
+  assert_int_equal(plan.point[1].segment, TEST_PAIR);
+  for (size_t i = 0; i < SONDE_COUNT_OF(TRY); ++i) {
+    sonde_judge *judge;
+    assert_int_equal(sonde_judge_create(&map, &plan, &judge, NULL), SONDE_OK);
+    test_press press = {0.14, 20, TRY[i].main, 0.9, 0.1};
+    feed_cuts(judge, &press, 0, TRY[i].left, TRY[i].aside_m);
+    uint32_t count;
+    const sonde_compression *p = sonde_judge_compressions(judge, &count);
+    assert_int_equal(count, 1);
+    assert_int_equal(p[0].result, TRY[i].result);
+    sonde_segment_status main = sonde_judge_segment(judge, 3);
+    sonde_segment_status pair = sonde_judge_segment(judge, TEST_PAIR);
+    assert_int_equal(main.done, TRY[i].main < 0.1);
+    assert_int_equal(pair.done, TRY[i].closed + TRY[i].open);
+    assert_int_equal(pair.open, TRY[i].open);
+    assert_int_equal(main.open, 0);
+    sonde_metrics m = sonde_judge_metrics(judge);
+    assert_int_equal(m.points_done, main.done + pair.done);
+    assert_near(m.coverage, m.points_done / 2.0, 0.01);
+    sonde_judge_destroy(judge);
+  }
+}
+
+// Beyond the reach of the station a vein that closes examines nothing; from behind neither. The
+// guidance sends the probe round the leg.
+static void a_station_is_where_its_vein_is(void **state) {
+  (void)state;
+  sonde_vein_map map = branched_map();
+  sonde_exam_protocol protocol = protocol_of(
+      "{sonde_protocol: 1, id: s, title: S, text: s, places: [{title: A, at: {station: behind}}]}");
+  sonde_plan plan = plan_of(&protocol, &map);
+  assert_int_equal(plan.point[0].segment, TEST_PAIR);
+  assert_string_equal(plan.point[0].text, "Landmarks.");
+  assert_true(isnan(plan.point[0].at.along_m));
+  sonde_judge *judge;
+  assert_int_equal(sonde_judge_create(&map, &plan, &judge, NULL), SONDE_OK);
+  const double left[3] = {0.02, 0.02, 0.02}, aside_m[3] = {0, 0, 0};
+  test_press press = {0.14, 20, 0.02, 0.9, 0.1};
+  feed_cuts(judge, &press, 0, left, aside_m); // cuts 0.1 m from the station's vein
+  sonde_guidance g = sonde_judge_guidance(judge);
+  assert_int_equal(g.point, 0);
+  assert_non_null(strstr(g.text, "the leg"));
+  assert_int_equal(sonde_judge_metrics(judge).points_done, 0);
+  sonde_judge_destroy(judge);
+}
+
 static sonde_judge *judged(const test_press *presses, size_t count, const size_t *order,
                            double step_s) {
   sonde_vein_map map = straight_map();
@@ -458,6 +548,8 @@ int main(void) {
       cmocka_unit_test(a_press_is_named),
       cmocka_unit_test(what_is_shown_is_what_is_judged),
       cmocka_unit_test(a_double_vein_is_closed_when_both_are),
+      cmocka_unit_test(each_vein_of_a_pair_closes),
+      cmocka_unit_test(a_station_is_where_its_vein_is),
       cmocka_unit_test(the_order_does_not_matter),
       cmocka_unit_test(coverage_adds_up),
       cmocka_unit_test(the_gap_shrinks),

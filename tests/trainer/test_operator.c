@@ -92,6 +92,66 @@ static void equal_seeds_equal_exams(void **state) {
   assert_true(memcmp(&a.metrics, &c.metrics, sizeof a.metrics) != 0);
 }
 
+// A round leg of radius 0.07: the main vein in front, a pair behind. The hand goes from one side to
+// the other around it without touching, and says of each what is there.
+static void the_hand_goes_round_the_leg(void **state) {
+  (void)state;
+  sonde_vein_map map = branched_map();
+  sonde_exam_protocol protocol = protocol_of(
+      "{sonde_protocol: 1, id: s, title: S, text: s, places: [{title: A, at: {station: pair}}, "
+      "{title: B, at: {station: behind}}]}");
+  sonde_plan plan = plan_of(&protocol, &map);
+  for (int clot = 0; clot < 2; ++clot) {
+    sonde_judge *judge;
+    sonde_operator *op;
+    sonde_device hand;
+    assert_int_equal(sonde_judge_create(&map, &plan, &judge, NULL), SONDE_OK);
+    assert_int_equal(sonde_operator_create("expert", 1, &map, &plan, 0.004, &op, &hand, NULL),
+                     SONDE_OK);
+    uint64_t tick = 0, beside = 0;
+    for (; !sonde_operator_done(op) && tick < 20000; ++tick) {
+      sonde_device_sample sample;
+      hand.read(hand.self, tick, &sample);
+      sonde_vec3 at = sample.world_from_probe.position;
+      double out_m = hypot(at.x, at.y), force_n = fmax(0, 1e3 * (0.07 - out_m));
+      if (fabs(at.y) > 0.02) { // on the way
+        ++beside;
+        assert_true(out_m > 0.075 && force_n == 0);
+        sonde_vec3 beam = q_rotate(sample.world_from_probe.rotation, vec3(0, 0, 1));
+        assert_true(-(beam.x * at.x + beam.y * at.y) > 0.5 * out_m); // looks at the leg
+      }
+      if (tick % 10) continue;
+      const double none = (double)NAN;
+      sonde_snapshot s = {.tick = tick,
+                          .time_s = 0.004 * (double)tick,
+                          .world_from_probe = sample.world_from_probe,
+                          .force_normal_n = force_n,
+                          .vein_area_ratio = none,
+                          .other_vein_ratio = none,
+                          .vein_rest_m = {none, none, none}};
+      if (at.x > 0)
+        s.vein_area_ratio = fmax(0, 1 - force_n / 20), s.vein_rest_m = vec3(0.05, 0, at.z);
+      if (at.x < 0) {
+        double other = clot ? 0.9 : fmax(0, 1 - force_n / 20);
+        s.crossing[0] = (sonde_vein_crossing){2, fmax(0, 1 - force_n / 20), at.y, {-0.05, 0, at.z}};
+        s.crossing[1] = (sonde_vein_crossing){3, other, at.y, {-0.05, 0.004, at.z}};
+        s.crossing_count = 2;
+      }
+      assert_true(sonde_judge_feed(judge, &s));
+      sonde_operator_see(op, &s);
+    }
+    assert_true(sonde_operator_done(op) && beside > 100);
+    sonde_judge_finish(judge);
+    assert_int_equal(sonde_judge_metrics(judge).points_done, 2);
+    assert_int_equal(sonde_operator_decision(op, 3), SONDE_DECISION_COMPRESSIBLE);
+    assert_int_equal(sonde_operator_decision(op, TEST_PAIR),
+                     clot ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE);
+    hand.destroy(hand.self);
+    sonde_operator_destroy(op);
+    sonde_judge_destroy(judge);
+  }
+}
+
 static void unknown_names_are_refused(void **state) {
   (void)state;
   sonde_vein_map map = straight_map();
@@ -109,7 +169,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_expert_finds_every_clot),   cmocka_unit_test(the_others_do_not_pass),
       cmocka_unit_test(faults_show_where_they_belong), cmocka_unit_test(equal_seeds_equal_exams),
-      cmocka_unit_test(unknown_names_are_refused),
+      cmocka_unit_test(the_hand_goes_round_the_leg),   cmocka_unit_test(unknown_names_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,19 +8,25 @@ static void the_protocols_that_ship(void **state) {
   sonde_error error = {0};
   if (sonde_exam_protocol_list(SONDE_SOURCE_DIR "/data/protocols", &all, &count, &error))
     fail_msg("%s", error.message);
-  assert_int_equal(count, 3);
+  assert_int_equal(count, 4);
   assert_string_equal(all[0].id, "two_point");
-  assert_string_equal(all[2].id, "extended");
+  assert_string_equal(all[2].id, "whole_leg");
+  assert_string_equal(all[3].id, "extended");
   sonde_vein_map map = straight_map(); // without the saphenous vein: its place is left out
   uint32_t before = 0;
   for (uint32_t i = 0; i < count; ++i) {
+    if (i == 2) { // a thigh has no calf, and is not called examined without it
+      sonde_plan none;
+      assert_int_equal(sonde_plan_make(&all[i], &map, &none, &error), SONDE_NOT_FOUND);
+      continue;
+    }
     sonde_plan plan = plan_of(&all[i], &map);
     assert_true(plan.count > before);
     before = plan.count;
     for (uint32_t k = 1; k < plan.count; ++k) {
       double step = plan.point[k].at.along_m - plan.point[k - 1].at.along_m;
       assert_true(step > 0); // from the groin to the knee
-      if (i == 2) assert_true(step <= 0.02 + 1e-9);
+      if (i == 3) assert_true(step <= 0.02 + 1e-9);
       assert_true(plan.point[k].text[0] && plan.point[k].title[0]);
     }
     assert_true(plan.criteria.tilt_rad > 0.34 && plan.criteria.tilt_rad < 0.35);

@@ -235,6 +235,53 @@ static void files_say_the_same(void **state) {
   sonde_judge_destroy(judge);
 }
 
+// A clot below the knee is the diagnosis where the protocol asks for the calf, and left to another
+// examination where it does not; one in a superficial vein is a finding and no thrombosis.
+static void what_counts_is_what_is_asked(void **state) {
+  (void)state;
+  sonde_vein_map map = branched_map();
+  sonde_exam_protocol thigh = every_20_mm();
+  sonde_exam_protocol leg = protocol_of(
+      "{sonde_protocol: 1, id: leg, title: L, text: l, places: [{title: A, at: {station: pair}}, "
+      "{title: B, at: {station: behind}}, {title: C, at: {station: pair}, segment: "
+      "great_saphenous}]}");
+  const struct {
+    bool asks_calf;
+    const char *filled; // the branch with the clot
+    sonde_decision pair, superficial;
+    bool thrombosis, correct, found;
+  } TRY[] = {
+      {true, "second_posterior_tibial_vein", SONDE_DECISION_CLOT, 1, true, true, true},
+      {true, "second_posterior_tibial_vein", 1, 1, true, false, false},
+      {true, "great_saphenous", 1, SONDE_DECISION_CLOT, false, true, true},
+      {true, "great_saphenous", 1, 1, false, true, false},
+      {true, "great_saphenous", SONDE_DECISION_CLOT, 1, false, false, false},
+      {false, "posterior_tibial_vein", 0, 0, false, true, true},
+      {false, "great_saphenous", 0, 0, false, true, true},
+  };
+  for (size_t i = 0; i < SONDE_COUNT_OF(TRY); ++i) {
+    sonde_plan plan = plan_of(TRY[i].asks_calf ? &leg : &thigh, &map);
+    sonde_judge *judge;
+    assert_int_equal(sonde_judge_create(&map, &plan, &judge, NULL), SONDE_OK);
+    for (uint32_t k = 0; k < 5; ++k)
+      sonde_judge_decide(judge, k, SONDE_DECISION_COMPRESSIBLE, NULL);
+    sonde_judge_decide(judge, TEST_PAIR, TRY[i].pair, NULL);
+    sonde_judge_decide(judge, TEST_SUPERFICIAL, TRY[i].superficial, NULL);
+    sonde_case truth = truth_of(0);
+    truth.branch_count = 1;
+    truth.branch[0].pathology.thrombus_fraction = 1;
+    snprintf(truth.branch[0].branch, sizeof truth.branch[0].branch, "%s", TRY[i].filled);
+    sonde_score score = score_of(judge, &truth);
+    assert_int_equal(score.thrombosis, TRY[i].thrombosis);
+    assert_int_equal(score.correct, TRY[i].correct);
+    bool all = true;
+    for (uint32_t k = 0; k < score.segment_count; ++k)
+      if (score.segment[k].needed) all &= score.segment[k].correct;
+    assert_int_equal(all, TRY[i].found);
+    sonde_judge_destroy(judge);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_wrong_diagnosis_never_passes),
@@ -243,6 +290,7 @@ int main(void) {
       cmocka_unit_test(the_score_grows_with_coverage),
       cmocka_unit_test(guesses_earn_nothing),
       cmocka_unit_test(two_regions_miss_the_middle),
+      cmocka_unit_test(what_counts_is_what_is_asked),
       cmocka_unit_test(a_series_counts),
       cmocka_unit_test(files_say_the_same),
   };

@@ -46,6 +46,38 @@ static inline sonde_vein_map straight_map(void) {
   return map;
 }
 
+// The same with a pair of calf veins (vessels 2 and 3) and a superficial vein (4), and the two
+// stations "pair", where all three are, and "behind", on the other side of the leg.
+enum { TEST_PAIR = 5, TEST_SUPERFICIAL = 6 };
+static inline sonde_vein_map branched_map(void) {
+  sonde_vein_map map = straight_map();
+  sonde_quat facing = q_from_matrix(m_columns(vec3(0, 1, 0), vec3(0, 0, -1), vec3(-1, 0, 0)));
+  sonde_quat turned = q_from_matrix(m_columns(vec3(0, -1, 0), vec3(0, 0, -1), vec3(1, 0, 0)));
+  const double none = (double)NAN;
+  map.segment_count = 7;
+  map.segment[TEST_PAIR] =
+      (sonde_exam_segment){"posterior_tibial", 0.1, 0.2, SONDE_SEGMENT_CALF, 2, {2, 3}};
+  map.segment[TEST_SUPERFICIAL] =
+      (sonde_exam_segment){"great_saphenous", 0, 0.2, SONDE_SEGMENT_SUPERFICIAL, 1, {4}};
+  map.station_count = map.landmark_count = 2;
+  for (uint32_t i = 0; i < 2; ++i) {
+    const double x_m = i ? -0.07 : 0.07;
+    map.station[i] = (sonde_map_station){.segment = i ? TEST_PAIR : 3,
+                                         .text = "Landmarks.",
+                                         .probe = {vec3(x_m, 0, 0.14), i ? turned : facing}};
+    for (uint32_t k = 0; k < SONDE_SEGMENTS; ++k)
+      map.station[i].vein_m[k] =
+          i && k < TEST_PAIR ? vec3(none, none, none) : vec3(i ? -0.05 : 0.05, 0, 0.14);
+    snprintf(map.landmark[i], sizeof map.landmark[i], i ? "behind" : "pair");
+    snprintf(map.station[i].name, sizeof map.station[i].name, i ? "behind" : "pair");
+    map.landmark_z_m[i] = 0.14;
+  }
+  map.middle_z_m[1] = 0.2;
+  for (uint32_t k = 0; k < SONDE_MAP_MIDDLES; ++k)
+    map.middle_m[k] = vec3(0, 0, 0.2 * k / (SONDE_MAP_MIDDLES - 1));
+  return map;
+}
+
 static inline sonde_exam_protocol protocol_of(const char *text) {
   sonde_exam_protocol protocol;
   sonde_error error = {0};

@@ -3,8 +3,17 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "interior/interior.h"
 
 #include <string.h>
+
+bool sonde_vein_is_double(const char *branch) {
+  static const char *const DOUBLES[] = {"second_femoral_vein", "third_femoral_vein",
+                                        "second_popliteal_vein"};
+  for (size_t k = 0; k < SONDE_COUNT_OF(DOUBLES); ++k)
+    if (strcmp(branch, DOUBLES[k]) == 0) return true;
+  return false;
+}
 
 void sonde_snapshot_read_vessels(const sonde_interior *interior, sonde_snapshot *snapshot) {
   SONDE_ASSERT(interior != NULL && snapshot != NULL);
@@ -20,12 +29,19 @@ void sonde_snapshot_read_vessels(const sonde_interior *interior, sonde_snapshot 
   }
   if (sonde_interior_vessel_at_plane(interior, 1, pose, &artery))
     snapshot->artery_area_ratio = artery.area_ratio;
-  // The deep femoral vein is left out: it lies behind the femur's front and does not close under a
-  // press from the front, in health either.
-  for (int which = 2; which < (int)sonde_interior_vessel_count(interior); ++which) {
+  snapshot->crossing_count = 0;
+  for (uint32_t which = 2; which < sonde_interior_vessel_count(interior); ++which) {
     sonde_vessel_state v;
-    if (strcmp(sonde_interior_vessel_name(interior, which), "second_femoral_vein") != 0) continue;
-    if (sonde_interior_vessel_at_plane(interior, which, snapshot->world_from_probe, &v))
+    if (interior->course[which].kind != SONDE_VESSEL_VEIN ||
+        !sonde_interior_vessel_at_plane(interior, (int)which, pose, &v))
+      continue;
+    if (sonde_vein_is_double(sonde_interior_vessel_name(interior, (int)which)))
       snapshot->other_vein_ratio = fmax(snapshot->other_vein_ratio, v.area_ratio);
+    if (snapshot->crossing_count == SONDE_VEIN_CROSSINGS) continue;
+    snapshot->crossing[snapshot->crossing_count++] =
+        (sonde_vein_crossing){.vessel = which,
+                              .area_ratio = v.area_ratio,
+                              .aside_m = pose_apply_inverse(pose, v.centre_m).x,
+                              .rest_m = v.rest_centre_m};
   }
 }

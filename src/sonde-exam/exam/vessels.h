@@ -4,7 +4,10 @@
 
 #include "sonde/exam.h"
 
-// Vein, artery and a second femoral vein in the image plane of the snapshot's pose; members without
+// Whether a branch lies beside the main vein as its double, so that both must close. @thread any
+bool sonde_vein_is_double(const char *branch);
+
+// Vein, artery and the other veins in the image plane of the snapshot's pose; members without
 // a vessel in view keep what they hold. No allocation. @thread of the interior's updates
 void sonde_snapshot_read_vessels(const sonde_interior *interior, sonde_snapshot *snapshot);
 

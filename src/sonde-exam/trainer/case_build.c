@@ -1,6 +1,7 @@
 // A case on its thigh: the model, the pathology where its vein has the places, and the check that
 // the truth is what was built.
 #include "trainer/case.h"
+#include "exam/vessels.h"
 #include "tissue/anatomy.h"
 
 #include <string.h>
@@ -40,20 +41,42 @@ static sonde_status get_model(const sonde_case *from, const char *bundled, const
   return sonde_limb_model_load(path, model, error);
 }
 
-// A stretch of vein as z of the model.
+// A stretch of vein as z of the model. @param line of the branch that has the clot; NULL: main vein
 static sonde_status place_extent(const sonde_case_extent *extent, const sonde_vein_map *map,
-                                 sonde_pathology *pathology, sonde_error *error) {
+                                 const sonde_vessel *line, sonde_pathology *pathology,
+                                 sonde_error *error) {
   pathology->thrombus_from_m = pathology->thrombus_to_m = 0; // all
   if (extent->whole) return SONDE_OK;
-  double from, to;
-  sonde_status status = sonde_station_find(&extent->from, map, &from, error);
-  if (!status) status = sonde_station_find(&extent->to, map, &to, error);
-  if (status) return status;
-  if (!(to > from))
+  const sonde_station *end[2] = {&extent->from, &extent->to};
+  double z_m[2], along_m[2] = {0, 1};
+  for (int k = 0; k < 2; ++k) {
+    if (line && end[k]->of_branch) { // a share of its length, shifted along it
+      double length_m = 0, left_m;
+      for (uint32_t i = 1; i < line->count; ++i)
+        length_m += v_distance(line->point[i].centre_m, line->point[i - 1].centre_m);
+      along_m[k] = left_m = clamp(end[k]->share * length_m + end[k]->shift_m, 0, length_m);
+      z_m[k] = line->point[line->count - 1].centre_m.z;
+      for (uint32_t i = 1; i < line->count && left_m >= 0; ++i) {
+        sonde_vec3 a = line->point[i - 1].centre_m, b = line->point[i].centre_m;
+        double piece_m = v_distance(a, b);
+        if (left_m <= piece_m) z_m[k] = a.z + (piece_m > 0 ? left_m / piece_m : 0) * (b.z - a.z);
+        left_m -= left_m <= piece_m ? INFINITY : piece_m;
+      }
+      continue;
+    }
+    sonde_status status = sonde_station_find(end[k], map, &along_m[k], error);
+    if (status) return status;
+    z_m[k] = sonde_vein_at(map, along_m[k]).z_m;
+  }
+  if (end[0]->of_branch != end[1]->of_branch)
     return sonde_fail(error, SONDE_ARGUMENT,
-                      "a clot from %.0f to %.0f mm below the groin end, expected from < to",
-                      1e3 * from, 1e3 * to);
-  double a = sonde_vein_at(map, from).z_m, b = sonde_vein_at(map, to).z_m;
+                      "a clot from a place of the branch to one of another vein, expected both "
+                      "as shares of the branch");
+  if (!(along_m[1] > along_m[0]))
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "a clot from %.0f to %.0f mm along the vein, expected from < to",
+                      1e3 * along_m[0], 1e3 * along_m[1]);
+  double a = z_m[0], b = z_m[1];
   pathology->thrombus_from_m = fmin(a, b);
   pathology->thrombus_to_m = fmax(a, b);
   return SONDE_OK;
@@ -87,7 +110,8 @@ static sonde_status place_findings(const sonde_case *from, sonde_case_setup *set
     sonde_branch_finding *to = &findings->branch[i];
     to->pathology = branch->pathology;
     memcpy(to->branch, branch->branch, sizeof to->branch);
-    sonde_status status = place_extent(&branch->extent, &setup->map, &to->pathology, error);
+    sonde_status status =
+        place_extent(&branch->extent, &setup->map, &there->line, &to->pathology, error);
     if (status) return status;
   }
   return SONDE_OK;
@@ -95,10 +119,10 @@ static sonde_status place_findings(const sonde_case *from, sonde_case_setup *set
 
 // ---- truth
 
-static double clot_length(const sonde_pathology *p, const sonde_segment *segment) {
+static double clot_length(const sonde_pathology *p, double from_m, double to_m) {
   if (!(p->thrombus_fraction > 0)) return 0;
-  if (p->thrombus_from_m == p->thrombus_to_m) return segment->to_m - segment->from_m;
-  return fmax(0, fmin(p->thrombus_to_m, segment->to_m) - fmax(p->thrombus_from_m, segment->from_m));
+  if (p->thrombus_from_m == p->thrombus_to_m) return to_m - from_m;
+  return fmax(0, fmin(p->thrombus_to_m, to_m) - fmax(p->thrombus_from_m, from_m));
 }
 
 // Every segment is called what its vein is.
@@ -110,33 +134,42 @@ static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *
       return sonde_fail(error, SONDE_MISMATCH, "%s: the truth names '%s', which the thigh has not",
                         from->id, from->truth_segment[k]);
   for (uint32_t i = 0; i < map->segment_count; ++i) {
-    const sonde_segment *segment = &map->segment[i];
-    sonde_decision called = SONDE_DECISION_NONE;
-    for (uint32_t k = 0; k < from->truth_count; ++k)
-      if (strcmp(from->truth_segment[k], segment->name) == 0) called = from->truth[k];
+    const sonde_exam_segment *segment = &map->segment[i];
+    const bool main = segment->vein_count == 0;
+    sonde_decision called = sonde_case_truth(from, segment->name);
     if (called == SONDE_DECISION_NONE)
       return sonde_fail(error, SONDE_MISMATCH, "%s: the truth misses the segment '%s'", from->id,
                         segment->name);
 
-    // A second femoral vein is a deep vein of the segment beside it; other branches are not.
-    double clot_m = clot_length(&setup->pathology, segment);
+    // The second vein of a double one is a deep vein of the segment beside it.
+    double from_m = segment->from_m, to_m = segment->to_m;
+    double clot_m = main ? clot_length(&setup->pathology, from_m, to_m) : 0;
     for (uint32_t b = 0; b < setup->findings.branch_count; ++b) {
       const sonde_branch_finding *finding = &setup->findings.branch[b];
-      if (strcmp(finding->branch, "second_femoral_vein") != 0) continue;
       const sonde_vessel *line =
           &sonde_anatomy_branch(setup->model->anatomy, finding->branch)->line;
       double z0 = line->point[0].centre_m.z, z1 = line->point[line->count - 1].centre_m.z;
-      sonde_segment beside = *segment;
-      beside.from_m = fmax(segment->from_m, fmin(z0, z1));
-      beside.to_m = fmin(segment->to_m, fmax(z0, z1));
-      if (beside.to_m > beside.from_m)
-        clot_m = fmax(clot_m, clot_length(&finding->pathology, &beside));
+      double first_m = fmax(from_m, fmin(z0, z1)), last_m = fmin(to_m, fmax(z0, z1));
+      const char *of = sonde_segment_of_branch(finding->branch);
+      bool twin = sonde_vein_is_double(finding->branch) && last_m > first_m;
+      if (main && twin) clot_m = fmax(clot_m, clot_length(&finding->pathology, first_m, last_m));
+      const sonde_pathology *p = &finding->pathology;
+      if (main || !of || strcmp(of, segment->name) != 0 || !(p->thrombus_fraction > 0)) continue;
+      double filled_m = 0; // pieces of the branch whose middle is in the clot
+      for (uint32_t n = 1; n < line->count; ++n) {
+        sonde_vec3 start = line->point[n - 1].centre_m, end = line->point[n].centre_m;
+        double z_m = 0.5 * (start.z + end.z);
+        bool all = p->thrombus_from_m == p->thrombus_to_m;
+        if (all || (z_m >= p->thrombus_from_m && z_m <= p->thrombus_to_m))
+          filled_m += v_distance(start, end);
+      }
+      clot_m = fmax(clot_m, filled_m);
     }
     if ((called == SONDE_DECISION_CLOT) == (clot_m >= CLOT_M)) continue;
     return sonde_fail(error, SONDE_MISMATCH,
                       "%s: the truth calls %s %s, but %.0f of its %.0f mm have a clot", from->id,
                       segment->name, called == SONDE_DECISION_CLOT ? "clot" : "compressible",
-                      1e3 * clot_m, 1e3 * (segment->to_m - segment->from_m));
+                      1e3 * clot_m, 1e3 * (to_m - from_m));
   }
   return SONDE_OK;
 }
@@ -150,7 +183,7 @@ sonde_status sonde_case_build(const sonde_case *from, const char *bundled, const
   sonde_status status = sonde_case_check(from, error);
   if (!status) status = get_model(from, bundled, directory, &setup->model, error);
   if (!status) status = sonde_vein_map_make(setup->model, &setup->map, error);
-  if (!status) status = place_extent(&from->extent, &setup->map, &setup->pathology, error);
+  if (!status) status = place_extent(&from->extent, &setup->map, NULL, &setup->pathology, error);
   if (!status) status = place_findings(from, setup, error);
   if (!status) status = check_truth(from, setup, error);
   sonde_circulation_apply(&from->circulation, 0, 1e-3, &setup->pathology);

@@ -195,9 +195,9 @@ static void read_pathology(sonde_reader *reader, sonde_place root, sonde_case *c
 
 static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
   static const char *const KEYS[] = {"thrombosis", "diagnosis", "segments", "look_alikes", NULL};
-  static const char *const NAMES[] = {
-      "common_femoral", "femoral_proximal", "femoral_mid", "femoral_distal",
-      "popliteal",      "popliteal_near",   NULL};
+  const char *names[TRAINER_SEGMENTS + 2] = {NULL};
+  for (uint32_t i = 0; i < TRAINER_SEGMENTS; ++i) names[i] = sonde_segment_known(i, NULL);
+  names[TRAINER_SEGMENTS] = "popliteal_near"; // of files about thighs
   static const char *const WORDS[] = {"compressible", "clot", NULL};
   sonde_place at = sonde_read_find(reader, root, "truth");
   if (!at) {
@@ -210,14 +210,13 @@ static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
   c->thrombosis = sonde_read_bool(reader, at, "thrombosis", false);
   sonde_read_member(reader, at, "diagnosis", true, c->diagnosis, sizeof c->diagnosis);
   sonde_place segments = sonde_read_find(reader, at, "segments");
-  if (segments) sonde_read_keys(reader, segments, "segments", NAMES);
-  for (int i = 0; segments && NAMES[i]; ++i) {
-    if (!sonde_read_find(reader, segments, NAMES[i])) continue;
-    int word = sonde_read_choice(reader, segments, NAMES[i], WORDS, 0);
+  if (segments) sonde_read_keys(reader, segments, "segments", names);
+  for (int i = 0; segments && names[i]; ++i) {
+    if (!sonde_read_find(reader, segments, names[i])) continue;
+    int word = sonde_read_choice(reader, segments, names[i], WORDS, 0);
     SONDE_ASSERT(c->truth_count < SONDE_SEGMENTS);
-    const bool near = strcmp(NAMES[i], "popliteal_near") == 0; // of files about thighs
     snprintf(c->truth_segment[c->truth_count], sizeof c->truth_segment[0], "%s",
-             near ? "popliteal" : NAMES[i]);
+             i == TRAINER_SEGMENTS ? "popliteal" : names[i]);
     c->truth[c->truth_count++] = word ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
   }
   sonde_place list = sonde_read_find(reader, at, "look_alikes");
@@ -238,16 +237,37 @@ static sonde_status check_id(const char *id, sonde_error *error) {
   return id[0] ? SONDE_OK : sonde_fail(error, SONDE_FORMAT, "the case has no id");
 }
 
+sonde_decision sonde_case_truth(const sonde_case *of, const char *segment) {
+  SONDE_ASSERT(of && segment && of->branch_count <= SONDE_BRANCHES);
+  for (uint32_t k = 0; k < of->truth_count; ++k)
+    if (strcmp(of->truth_segment[k], segment) == 0) return of->truth[k];
+  sonde_segment_kind kind = SONDE_SEGMENT_MAIN;
+  for (uint32_t i = 0; i < TRAINER_SEGMENTS; ++i) {
+    sonde_segment_kind own;
+    if (strcmp(sonde_segment_known(i, &own), segment) == 0) kind = own;
+  }
+  for (uint32_t b = 0; b < of->branch_count; ++b) {
+    const char *filled = sonde_segment_of_branch(of->branch[b].branch);
+    if (of->branch[b].pathology.thrombus_fraction > 0 && filled && strcmp(filled, segment) == 0)
+      return SONDE_DECISION_CLOT;
+  }
+  return kind == SONDE_SEGMENT_MAIN ? SONDE_DECISION_NONE : SONDE_DECISION_COMPRESSIBLE;
+}
+
 sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
   SONDE_ASSERT(of && of->truth_count <= SONDE_SEGMENTS);
   sonde_status status = check_id(of->id, error);
   if (status) return status;
-  bool clot = false;
-  for (uint32_t i = 0; i < of->truth_count; ++i) clot |= of->truth[i] == SONDE_DECISION_CLOT;
+  bool clot = false; // of a deep vein
+  for (uint32_t i = 0; i < TRAINER_SEGMENTS; ++i) {
+    sonde_segment_kind kind;
+    const char *name = sonde_segment_known(i, &kind);
+    clot |= kind != SONDE_SEGMENT_SUPERFICIAL && sonde_case_truth(of, name) == SONDE_DECISION_CLOT;
+  }
   if (of->truth_count == 0) return sonde_fail(error, SONDE_FORMAT, "the truth has no segments");
   if (clot != of->thrombosis)
     return sonde_fail(error, SONDE_MISMATCH, "thrombosis is %s, but %s segment is clot",
-                      of->thrombosis ? "true" : "false", clot ? "a" : "no");
+                      of->thrombosis ? "true" : "false", clot ? "a" : "no deep");
   if (of->webs > 0 && !(of->pathology.thrombus_fraction > 0))
     return sonde_fail(error, SONDE_MISMATCH, "webs in a vein without a clot");
   return SONDE_OK;
@@ -271,10 +291,10 @@ sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *ou
   if (version == 1) keys[SONDE_COUNT_OF(keys) - 2] = "criteria";
   sonde_read_keys(reader, root, "a case", keys);
   if (!sonde_read_find(reader, root, "sonde_case"))
-    sonde_reader_fail(reader, root, SONDE_FORMAT, "sonde_case: 2 is missing");
-  if (version != 1 && version != SONDE_CASE_VERSION)
+    sonde_reader_fail(reader, root, SONDE_FORMAT, "sonde_case: %d is missing", SONDE_CASE_VERSION);
+  if (version != 1 && version != 2 && version != SONDE_CASE_VERSION)
     sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_case"), SONDE_VERSION,
-                      "case of version %g, expected 1 or %d", version, SONDE_CASE_VERSION);
+                      "case of version %g, expected 1 to %d", version, SONDE_CASE_VERSION);
   sonde_read_member(reader, root, "id", true, out->id, sizeof out->id);
   sonde_error problem = {0};
   if (sonde_reader_good(reader) && check_id(out->id, &problem))

@@ -13,7 +13,12 @@ static void put_quoted(sonde_file *file, const char *before, const char *text) {
 }
 
 static void put_station(sonde_file *file, const char *key, const sonde_station *s) {
-  if (s->landmark[0])
+  if (s->of_branch)
+    sonde_file_printf(file, "%s: {share: %.12g, shift_mm: %.12g}", key, s->share, 1e3 * s->shift_m);
+  else if (s->station[0])
+    sonde_file_printf(file, "%s: {station: %s, shift_mm: %.12g}", key, s->station,
+                      1e3 * s->shift_m);
+  else if (s->landmark[0])
     sonde_file_printf(file, "%s: {landmark: %s, shift_mm: %.12g}", key, s->landmark,
                       1e3 * s->shift_m);
   else if (!s->segment[0])

@@ -31,7 +31,9 @@ sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_case_setup *s
   if (!status)
     status = sonde_operator_create(def->operator_name, def->seed, &setup->map, &plan, BENCH_STEP_S,
                                    &op, &hand, error);
-  if (!status) status = sonde_bench_open(&bench, setup, &setup->findings, def->solid, error);
+  // Columns stand on one bone: below the knee of a limb they are far from what closes its veins.
+  bool solid = def->solid || setup->map.station_count > 0;
+  if (!status) status = sonde_bench_open(&bench, setup, &setup->findings, solid, error);
 
   // Ticks until the operator is done.
   sonde_device_sample sample = {0};

@@ -32,6 +32,16 @@ void sonde_motion_pressed(sonde_motion *motion);
 // Log dimensionless jerk, mean over the approaches; NaN before the probe has moved.
 double sonde_motion_smoothness(const sonde_motion *motion);
 
+// One segment's veins in the press under way; those of the main vein share the first segment's.
+typedef struct sonde_vein_view {
+  double now; // greatest area ratio of its veins in the newest snapshot; NaN: not in view
+  bool seen_at_peak;
+  double ratio, artery_ratio; // least of the press, and the artery's at that moment
+  double tilt_rad;            // of the main vein then
+  sonde_vec3 probe_y;         // normal of the image plane then
+  sonde_vec3 start_m;         // where the plane cut the vein first; NaN: not yet
+} sonde_vein_view;
+
 struct sonde_judge {
   sonde_vein_map map;
   sonde_plan plan;
@@ -51,8 +61,9 @@ struct sonde_judge {
   bool covered[JUDGE_BINS], wanted[JUDGE_BINS];
 
   // the press under way
-  bool pressing, seen_at_peak;
+  bool pressing;
   sonde_compression now;
+  sonde_vein_view view[SONDE_SEGMENTS];
   double trough_n; // least force since the last press
 
   // time
@@ -84,12 +95,16 @@ sonde_vein_run sonde_vein_longest_gap(const bool *planned, const bool *covered, 
 // Ends of a segment as distances along the vein, the one at the groin first.
 void sonde_vein_segment_ends(const sonde_vein_map *map, uint32_t segment, double *from_m,
                              double *to_m);
-// A good press lies within reach of the place.
+// Slot of sonde_judge.view that holds a segment's veins.
+static inline uint32_t sonde_segment_slot(const sonde_vein_map *map, uint32_t segment) {
+  return map->segment[segment].vein_count > 0 ? segment : 0;
+}
+// A good press examined the place.
 bool sonde_place_is_done(const sonde_plan *plan, uint32_t place, const sonde_compression *presses,
                          uint32_t count);
 
-// What a press is so far.
-sonde_press_result sonde_press_classify(const sonde_judge *judge);
+// What the press under way is so far, with the places that it examines and the area that says so.
+sonde_compression sonde_press_weigh(const sonde_judge *judge);
 // The force of the place where the press under way is, NaN without a place.
 sonde_force_target sonde_press_target(const sonde_judge *judge);
 // A press is under way within reach of no place of the plan.

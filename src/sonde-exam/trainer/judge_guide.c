@@ -33,12 +33,17 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   sonde_vec3 down = v_sub(map->point[map->point_count - 1].vein_m, map->point[0].vein_m);
   if (v_dot(down, course) < 0) course = v_neg(course);
   double along_m = v_dot(flat, course);
+  // On the other side of the leg the way along the skin says nothing.
+  sonde_vec3 beam = q_rotate(pose.rotation, vec3(0, 0, 1));
+  const double facing = 0.3;
+  bool turned = -v_dot(beam, normal) < facing;
   double transverse = fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), course));
   g->angle_rad = acos(fmin(transverse, 1));
-  g->offset_m = v_norm(flat);
+  g->offset_m = v_norm(turned ? away : flat);
   g->angle_ok = g->angle_rad <= c->tilt_rad;
   // a press at a place is finished before the next one is named
-  bool elsewhere = judge->pressing ? sonde_press_is_astray(judge) : g->offset_m > c->reach_m;
+  bool elsewhere =
+      judge->pressing ? sonde_press_is_astray(judge) : turned || g->offset_m > c->reach_m;
   if (!elsewhere) {
     if (!g->angle_ok) {
       snprintf(g->text, sizeof g->text,
@@ -67,9 +72,19 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   const char *move = judge->pressing ? "Not here: let go and move" : "Move";
   double across_mm = 1e3 * sqrt(fmax(0, g->offset_m * g->offset_m - along_m * along_m));
   double along_mm = fabs(1e3 * along_m);
-  if (along_mm >= across_mm)
+  bool calf = map->segment[point->segment].kind == SONDE_SEGMENT_CALF;
+  const char *towards = along_m < 0 ? (calf ? "foot" : "knee") : calf ? "knee" : "groin";
+  const double steep = 0.6; // of a normal that looks to the front or the back
+  if (turned)
+    snprintf(g->text, sizeof g->text, "%s to the %s of the leg: %s.",
+             judge->pressing ? "Not here: let go and go" : "Go",
+             normal.y > steep    ? "front"
+             : normal.y < -steep ? "back"
+                                 : "inner side",
+             point->title);
+  else if (along_mm >= across_mm)
     snprintf(g->text, sizeof g->text, "%s the probe %.0f mm towards the %s: %s.", move, along_mm,
-             along_m < 0 ? "knee" : "groin", point->title);
+             towards, point->title);
   else
     snprintf(g->text, sizeof g->text, "%s the probe %.0f mm sideways: %s.", move, across_mm,
              point->title);

@@ -14,9 +14,19 @@ sonde_metrics sonde_judge_metrics(const sonde_judge *judge) {
     both += judge->wanted[i] && judge->covered[i];
   }
   sonde_vein_run gap = sonde_vein_longest_gap(judge->wanted, judge->covered, steps);
+  // A place on another vein is as much of it as a place on the main vein is of that one.
+  double missed_m = 0;
+  for (uint32_t i = 0; i < judge->plan.count; ++i) {
+    const double stretch_m = 2 * judge->plan.criteria.reach_m;
+    uint32_t stretch = (uint32_t)lround(stretch_m / JUDGE_BIN_M);
+    if (sonde_segment_slot(&judge->map, judge->plan.point[i].segment) == 0) continue;
+    wanted += stretch;
+    both += judge->done[i] ? stretch : 0;
+    if (!judge->done[i]) missed_m = stretch_m;
+  }
   m.coverage = wanted ? (double)both / wanted : 0;
   m.vein_coverage = fmin(1, covered / fmin(judge->map.length_m / JUDGE_BIN_M, JUDGE_BINS));
-  m.gap_m = (gap.to - gap.from) * JUDGE_BIN_M;
+  m.gap_m = fmax(missed_m, (gap.to - gap.from) * JUDGE_BIN_M);
 
   // Places and presses.
   for (uint32_t i = 0; i < judge->plan.count; ++i) m.points_done += judge->done[i];

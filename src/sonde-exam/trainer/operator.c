@@ -2,6 +2,7 @@
 #include "trainer/trainer.h"
 
 #include "base/random.h"
+#include "haptics/motion.h"
 
 #include <string.h>
 
@@ -95,6 +96,8 @@ static const double LIFT_M = 0.006, DEEPEST_M = 0.060, TOUCH_N = 1.5, HOLD_S = 0
 static const double GIVES_WAY = 0.8; // share of the force so far, once above SLIP_SHARE
 static const double SLIP_SHARE = 0.6, CALL_SHARE = 0.32; // of the place's firm force
 static const double NEAR_LIMIT = 0.95, RELEASE_M_S = 0.08;
+static const double ARCH_M = 0.03, ARCH_TURNED_M = 0.05; // out of a way through the air
+static const double FLIGHT = 2; // speed through the air over that along the skin
 
 typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, DONE } phase;
 
@@ -109,10 +112,13 @@ struct sonde_operator {
 
   phase phase;
   uint32_t place, attempt, opens;
-  double along_m, across_m, twist_rad, depth_m; // where the hand is told to be
-  double sway_m, sway_across_m;                 // beside it, while looking
-  double aim_m, aim_across_m, aim_twist_rad;    // at this attempt
-  double beyond_m;                              // the travel goes there first
+  double along_m, across_m, twist_rad, depth_m; // where the hand is told to be, from the place
+  bool flying;                                  // through the air to the place, from `left`
+  double flown;                                 // share of that way
+  sonde_pose left;
+  double sway_m, sway_across_m;              // beside it, while looking
+  double aim_m, aim_across_m, aim_twist_rad; // at this attempt
+  double beyond_m;                           // the travel goes there first
   double stop_n, wait_s, last_s;
   double ratio, peak_n;        // of this press; NaN: not seen
   double felt_n, felt_depth_m; // at the last look
@@ -134,7 +140,7 @@ static double spread(sonde_operator *op, double size) {
 static void aim(sonde_operator *op) {
   const habit *h = &op->habit;
   double calm = op->attempt > 0 ? 0.5 : 1; // a second try is made with more care
-  op->aim_m = op->plan.point[op->place].at.along_m + calm * spread(op, h->along_m);
+  op->aim_m = calm * spread(op, h->along_m);
   op->aim_across_m = calm * spread(op, h->across_m);
   op->aim_twist_rad = calm * spread(op, h->twist_rad);
   const sonde_force_target *target = &op->plan.point[op->place].target;
@@ -149,19 +155,64 @@ static void aim(sonde_operator *op) {
   op->beyond_m = h->past_m > 0 ? spread(op, h->past_m) : 0;
 }
 
+// The middle of the leg at a height.
+static sonde_vec3 middle_at(const sonde_vein_map *map, double z_m) {
+  double low = map->middle_z_m[0], high = map->middle_z_m[1];
+  if (!(high > low)) return vec3(0, 0, z_m);
+  double at = clamp((z_m - low) / (high - low), 0, 1) * (SONDE_MAP_MIDDLES - 1);
+  uint32_t k = (uint32_t)fmin(at, SONDE_MAP_MIDDLES - 2);
+  sonde_vec3 middle = v_lerp(map->middle_m[k], map->middle_m[k + 1], at - k);
+  return vec3(middle.x, middle.y, z_m);
+}
+
 static sonde_pose pose_at(const sonde_operator *op) {
-  sonde_vein_point p = sonde_vein_at(&op->map, op->along_m + op->sway_m);
+  // Where the hand is once it has come to the place: along the main vein the skin's curve is
+  // followed, at a station its plane.
+  const sonde_plan_point *place = &op->plan.point[op->place < op->plan.count ? op->place : 0];
+  sonde_vein_point p = place->at;
+  double along_m = op->along_m + op->sway_m;
+  if (!place->station) p = sonde_vein_at(&op->map, place->at.along_m + along_m);
   sonde_vec3 z = v_neg(p.normal), y = v_cross(z, p.across);
   double c = cos(op->twist_rad), s = sin(op->twist_rad);
   sonde_vec3 x = v_add(v_scale(p.across, c), v_scale(y, s));
   sonde_vec3 at = v_madd(p.skin_m, op->across_m + op->sway_across_m, p.across);
-  return (sonde_pose){v_madd(at, -op->depth_m, p.normal),
+  if (place->station) at = v_madd(at, y.z < 0 ? -along_m : along_m, y);
+  sonde_pose there = {v_madd(at, -op->depth_m, p.normal),
                       q_from_matrix(m_columns(x, v_cross(z, x), z))};
+  if (!op->flying) return there;
+
+  // The way there from another side of the leg, around its middle and outside of it: height,
+  // direction and distance from the middle change evenly, farther out in between.
+  double t = op->flown, z_m = op->left.position.z + t * (there.position.z - op->left.position.z);
+  sonde_vec3 from = v_sub(op->left.position, middle_at(&op->map, op->left.position.z));
+  sonde_vec3 to = v_sub(there.position, middle_at(&op->map, there.position.z));
+  double start = atan2(from.y, from.x), turn = remainder(atan2(to.y, to.x) - start, 2 * SONDE_PI);
+  double near_m = hypot(from.x, from.y), far_m = hypot(to.x, to.y);
+  double arch = (ARCH_M + ARCH_TURNED_M * fabs(turn) / SONDE_PI) * sin(SONDE_PI * t);
+  double angle = start + t * turn, out_m = near_m + t * (far_m - near_m) + arch;
+  sonde_vec3 out = vec3(out_m * cos(angle), out_m * sin(angle), 0);
+  // The beam keeps looking at the leg: the probe turns with the direction, the rest evenly.
+  sonde_quat all = {cos(0.5 * turn), 0, 0, sin(0.5 * turn)};
+  sonde_quat part = {cos(0.5 * t * turn), 0, 0, sin(0.5 * t * turn)};
+  sonde_quat goal = q_mul(q_conj(all), there.rotation);
+  return (sonde_pose){v_add(middle_at(&op->map, z_m), out),
+                      q_mul(part, sonde_quat_slerp(op->left.rotation, goal, t))};
 }
 
-// The next place that is visited, or the end.
+// The next place that is visited, or the end. Between two places of the main vein the hand goes
+// along it, else through the air.
 static void begin_place(sonde_operator *op, uint32_t place) {
   while (place < op->plan.count && !op->visit[place]) ++place;
+  const uint32_t before = op->place;
+  const bool any = op->started && before < op->plan.count && place < op->plan.count;
+  if (any && before != place) {
+    const sonde_plan_point *old = &op->plan.point[before], *next = &op->plan.point[place];
+    op->left = pose_at(op);
+    op->flying = (old->station || next->station) && !sonde_same_stand(old, next);
+    op->flown = 0;
+    op->along_m += old->station || next->station ? 0 : old->at.along_m - next->at.along_m;
+    if (op->flying) op->along_m = op->across_m = 0;
+  }
   op->place = place;
   op->attempt = op->opens = 0;
   op->phase = place < op->plan.count ? TRAVEL : DONE;
@@ -182,9 +233,8 @@ sonde_status sonde_operator_create(const char *name, uint64_t seed, const sonde_
   if (!op) return sonde_fail_memory(error);
   *op = (sonde_operator){.habit = HABIT[k], .map = *map, .plan = *plan, .seed = seed};
   for (uint32_t i = 0; i < plan->count; ++i) op->visit[i] = uniform(op, 0, 1) >= op->habit.skip;
-  begin_place(op, 0);
-  op->along_m = plan->count > 0 ? plan->point[0].at.along_m : 0;
   op->depth_m = -LIFT_M;
+  begin_place(op, 0);
   sonde_status status = sonde_device_page(pose_at(op), dt_s, device, error);
   if (status) {
     sonde_free(op);
@@ -237,14 +287,28 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
   double dt_s = op->started ? clamp(s->time_s - op->last_s, 0, 0.2) : 0;
   op->started = true;
   op->last_s = s->time_s;
+  double vein = (double)NAN; // how open the veins are that the place asks for
+  if (op->place < op->plan.count)
+    vein = sonde_segment_ratio(&op->map, op->plan.point[op->place].segment, s, NULL);
   if (op->phase == PRESS || op->phase == HOLD) {
-    op->ratio = fmin(op->ratio, sonde_vein_ratio(s));
+    op->ratio = fmin(op->ratio, vein);
     op->peak_n = fmax(op->peak_n, s->force_normal_n);
   }
   switch (op->phase) {
   case TRAVEL: {
-    // Along the course of the vein at a small height, so that the skin's curve is followed.
     double step = h->travel_m_s * dt_s, goal_m = op->aim_m + op->beyond_m;
+    if (op->flying) {
+      const double least_m = 0.02;
+      sonde_vec3 a = op->left.position, b = op->plan.point[op->place].at.skin_m;
+      sonde_vec3 from = v_sub(a, middle_at(&op->map, a.z)), to = v_sub(b, middle_at(&op->map, b.z));
+      double turn = acos(clamp(v_dot(from, to) / (v_norm(from) * v_norm(to)), -1, 1));
+      double out_m = fmax(v_norm(from), v_norm(to)) + ARCH_M + ARCH_TURNED_M * turn / SONDE_PI;
+      double way_m = hypot(turn * out_m, a.z - b.z) + 2 * (ARCH_M + ARCH_TURNED_M);
+      op->flown = fmin(1, op->flown + FLIGHT * step / fmax(way_m, least_m));
+      op->flying = op->flown < 1;
+      break;
+    }
+    // Along the course of the vein at a small height, so that the skin's curve is followed.
     op->along_m = towards(op->along_m, goal_m, step);
     op->across_m = towards(op->across_m, op->aim_across_m, step);
     op->twist_rad = towards(op->twist_rad, op->aim_twist_rad, dt_s);
@@ -277,7 +341,6 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     double place_n = op->plan.point[op->place].target.firm_n;
     ends |= op->peak_n > SLIP_SHARE * place_n && force_n < GIVES_WAY * op->peak_n;
     // Who goes by the image ends at a closed vein, and at one that stays open at a firm force.
-    double vein = sonde_vein_ratio(s);
     double firm_n = place_n + h->past_firm_n;
     if (!(h->share_to > 0 || h->beyond_to_n > 0))
       ends |= vein <= h->closed_ratio || (force_n >= firm_n && vein >= h->open_ratio);
@@ -296,7 +359,7 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     break;
   case DONE: break;
   }
-  sonde_device_page_goal(&op->hand, pose_at(op));
+  if (op->phase != DONE) sonde_device_page_goal(&op->hand, pose_at(op));
 }
 
 bool sonde_operator_done(const sonde_operator *op) { return op->phase == DONE; }

@@ -17,7 +17,7 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
   SONDE_ASSERT(text && name && out);
   static const char *const KEYS[] = {"sonde_protocol", "id",     "title", "text",
                                      "criteria",       "places", NULL};
-  static const char *const PLACE[] = {"title", "text", "needs",    "at",
+  static const char *const PLACE[] = {"title", "text", "needs",    "segment", "at",
                                       "from",  "to",   "every_mm", NULL};
   static const char *const CRITERIA[] = {"tilt_deg", "closed_ratio", "open_ratio", "reach_mm",
                                          NULL};
@@ -62,9 +62,13 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
     sonde_read_keys(reader, at, "a place", PLACE);
     sonde_read_member(reader, at, "needs", false, stop->needs, sizeof stop->needs);
     sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
-    sonde_read_member(reader, at, "text", true, stop->text, sizeof stop->text);
+    sonde_read_member(reader, at, "segment", false, stop->segment, sizeof stop->segment);
     sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
     sonde_place to = sonde_read_find(reader, at, "to");
+    bool stands = one && sonde_read_find(reader, one, "station");
+    sonde_read_member(reader, at, "text", !stands, stop->text, sizeof stop->text);
+    if (stop->segment[0] && !stands)
+      sonde_reader_fail(reader, at, SONDE_FORMAT, "segment belongs to a place with a station");
     if ((one != 0) == (from != 0) || (from != 0) != (to != 0)) {
       sonde_reader_fail(reader, at, SONDE_FORMAT, "give either at, or from, to and every_mm");
       continue;
@@ -122,20 +126,51 @@ sonde_status sonde_exam_protocol_list(const char *directory, sonde_exam_protocol
 
 // ---- on a thigh
 
+// A place at a station of the limb, or on the main vein at along_m when `station` is NULL.
 static sonde_status add_point(const sonde_exam_stop *stop, const sonde_vein_map *map,
-                              double along_m, sonde_plan *plan, sonde_error *error) {
+                              const sonde_map_station *station, double along_m, sonde_plan *plan,
+                              sonde_error *error) {
+  const double none = (double)NAN;
   if (plan->count == SONDE_PLAN_POINTS)
     return sonde_fail(error, SONDE_ARGUMENT, "more than %d places, expected fewer",
                       SONDE_PLAN_POINTS);
   sonde_plan_point *point = &plan->point[plan->count];
-  point->at = sonde_vein_at(map, along_m);
-  point->segment = sonde_vein_segment_at(map, point->at.z_m);
+  *point = (sonde_plan_point){.station = station != NULL};
+  if (station) {
+    // The probe as it stands there, over the first vein of the segment.
+    point->segment = stop->segment[0] ? sonde_vein_segment(map, stop->segment) : station->segment;
+    if (point->segment == SONDE_SEGMENTS)
+      return sonde_fail(error, SONDE_NOT_FOUND, "'%s': the leg has no segment '%s' there",
+                        stop->title, stop->segment);
+    sonde_vec3 vein_m = station->vein_m[point->segment], down = vec3(0, 0, 1);
+    bool main = map->segment[point->segment].vein_count == 0;
+    if (!v_finite(vein_m))
+      return sonde_fail(error, SONDE_NOT_FOUND, "'%s': the station %s of this leg shows no %s",
+                        stop->title, station->name, map->segment[point->segment].name);
+    sonde_vec3 y = q_rotate(station->probe.rotation, vec3(0, 1, 0));
+    double slide_m = (y.z < 0 ? -1 : 1) * station->slide_m[point->segment];
+    sonde_vec3 face_m = v_madd(station->probe.position, slide_m, y);
+    if (main) point->segment = sonde_vein_segment_at(map, vein_m.z);
+    point->at = (sonde_vein_point){
+        .along_m = main ? sonde_vein_along(map, vein_m.z) : none,
+        .z_m = vein_m.z,
+        .vein_m = vein_m,
+        .skin_m = face_m,
+        .normal = v_neg(q_rotate(station->probe.rotation, down)),
+        .across = q_rotate(station->probe.rotation, vec3(1, 0, 0)),
+        .depth_m = v_distance(vein_m, face_m),
+    };
+  } else {
+    point->at = sonde_vein_at(map, along_m);
+    point->segment = sonde_vein_segment_at(map, point->at.z_m);
+  }
   if (point->segment == SONDE_SEGMENTS)
     return sonde_fail(error, SONDE_NOT_FOUND, "'%s' lies in no segment of the vein", stop->title);
   const char *segment = sonde_segment_title(map->segment[point->segment].name);
   snprintf(point->title, sizeof point->title, "%s", stop->every_m > 0 ? segment : stop->title);
-  memcpy(point->text, stop->text, sizeof point->text);
-  point->target = (sonde_force_target){(double)NAN, (double)NAN, (double)NAN};
+  bool own = stop->text[0] || !station || !station->text;
+  snprintf(point->text, sizeof point->text, "%s", own ? stop->text : station->text);
+  point->target = (sonde_force_target){none, none, none};
   plan->count++;
   return SONDE_OK;
 }
@@ -149,9 +184,19 @@ sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_ve
     const sonde_exam_stop *stop = &protocol->stop[i];
     if (stop->needs[0] && !sonde_vein_has_branch(map, stop->needs)) continue;
     double from_m, to_m;
+    const sonde_map_station *station = NULL;
+    for (uint32_t k = 0; k < map->station_count && !(stop->every_m > 0); ++k)
+      if (strcmp(map->station[k].name, stop->from.station) == 0) station = &map->station[k];
+    if (station) {
+      status = add_point(stop, map, station, 0, plan, error);
+      continue;
+    }
     status = sonde_station_find(&stop->from, map, &from_m, error);
+    if (!status && stop->segment[0])
+      status = sonde_fail(error, SONDE_NOT_FOUND, "'%s': a thigh has no station for %s",
+                          stop->title, stop->segment);
     if (!status && !(stop->every_m > 0)) {
-      status = add_point(stop, map, from_m, plan, error);
+      status = add_point(stop, map, NULL, from_m, plan, error);
       continue;
     }
     // Equal steps of at most every_m from the first place to the last.
@@ -159,7 +204,7 @@ sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_ve
     if (status) return status;
     double steps = fmax(1, ceil((fabs(to_m - from_m) - SAME_M) / stop->every_m));
     for (double k = 0; k <= steps && !status; ++k)
-      status = add_point(stop, map, from_m + (to_m - from_m) * k / steps, plan, error);
+      status = add_point(stop, map, NULL, from_m + (to_m - from_m) * k / steps, plan, error);
   }
   SONDE_ASSERT(plan->count <= SONDE_PLAN_POINTS);
   if (!status && plan->count == 0)

@@ -27,17 +27,24 @@ void sonde_read_station(sonde_reader *reader, sonde_place at, const char *what,
                         sonde_station *station) {
   static const char *const KEYS[] = {"segment", "share", "shift_mm", NULL};
   static const char *const MARK[] = {"landmark", "shift_mm", NULL};
+  static const char *const STATION[] = {"station", "shift_mm", NULL};
   *station = (sonde_station){0};
   if (sonde_read_is_text(reader, at)) {
     station->shift_m = 1e-3 * sonde_read_real_at(reader, at, what, 0, 1000);
     return;
   }
   bool mark = sonde_read_find(reader, at, "landmark") != 0;
-  sonde_read_keys(reader, at, what, mark ? MARK : KEYS);
+  bool stands = !mark && sonde_read_find(reader, at, "station") != 0;
+  sonde_read_keys(reader, at, what, mark ? MARK : stands ? STATION : KEYS);
   if (mark) {
     sonde_read_member(reader, at, "landmark", true, station->landmark, sizeof station->landmark);
+  } else if (stands) {
+    sonde_read_member(reader, at, "station", true, station->station, sizeof station->station);
   } else {
-    sonde_read_member(reader, at, "segment", true, station->segment, sizeof station->segment);
+    station->of_branch =
+        !sonde_read_find(reader, at, "segment") && sonde_read_find(reader, at, "share");
+    sonde_read_member(reader, at, "segment", !station->of_branch, station->segment,
+                      sizeof station->segment);
     // What files of cases call the vein above the knee, where a thigh ends.
     if (strcmp(station->segment, "popliteal_near") == 0) strcpy(station->segment, "popliteal");
     station->share = sonde_read_real(reader, at, "share", 0, 1, 0.5);

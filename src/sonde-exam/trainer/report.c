@@ -37,7 +37,7 @@ static void put_vein(sonde_json_out *out, const sonde_exam_report *exam) {
   sonde_json_put_real(out, "reach_mm", 1e3 * reach_m, 6);
   sonde_json_put_real(out, "tilt_deg", 180 / SONDE_PI * exam->plan->criteria.tilt_rad, 6);
   sonde_json_begin_list(out, "segments");
-  for (uint32_t i = 0; i < map->segment_count; ++i) {
+  for (uint32_t i = 0; i < map->segment_count && map->segment[i].vein_count == 0; ++i) {
     double from_m, to_m;
     sonde_vein_segment_ends(map, i, &from_m, &to_m);
     sonde_json_begin_object(out, NULL);

@@ -11,6 +11,7 @@ static double distance_from_chosen(const sonde_compression *presses, const uint3
     if (chosen[i] == index) return -1;
     if (a->result != b->result) continue;
     double apart = fabs(a->along_m - b->along_m);
+    if (!isfinite(apart)) apart = fabs(a->z_m - b->z_m); // other veins
     least = isfinite(apart) ? fmin(least, apart) : 0;
   }
   return least;

@@ -34,30 +34,34 @@ void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_
   for (uint32_t i = 0; i < score->segment_count; ++i) {
     sonde_segment_status status = sonde_judge_segment(judge, i);
     sonde_segment_verdict *v = &score->segment[i];
-    const sonde_segment *segment = &judge->map.segment[i];
+    const sonde_exam_segment *segment = &judge->map.segment[i];
     *v = (sonde_segment_verdict){.needed = status.needed,
                                  .decision = status.decision,
+                                 .truth = sonde_case_truth(truth, segment->name),
+                                 .kind = segment->kind,
                                  .from_m = segment->from_m,
                                  .to_m = segment->to_m,
                                  .points = status.points,
                                  .done = status.done};
     memcpy(v->name, segment->name, sizeof v->name);
-    for (uint32_t k = 0; k < truth->truth_count; ++k)
-      if (strcmp(truth->truth_segment[k], v->name) == 0) v->truth = truth->truth[k];
     v->correct = v->decision != SONDE_DECISION_NONE && v->decision == v->truth;
-    bool clot = v->decision == SONDE_DECISION_CLOT;
-    v->supported = clot ? judge->open[i] > 0 : judge->complete[i] > 0;
+    v->supported = v->decision == SONDE_DECISION_CLOT ? judge->open[i] > 0 : judge->complete[i] > 0;
   }
 
-  // The diagnosis: one segment with a clot makes a thrombosis, its absence takes all segments of
-  // the plan.
-  bool all = true;
+  // The diagnosis: one deep segment with a clot makes a thrombosis, its absence takes all segments
+  // of the plan. A clot below the knee counts where the protocol asks for the calf.
+  bool all = true, calf = false;
+  for (uint32_t i = 0; i < score->segment_count; ++i)
+    calf |= score->segment[i].kind == SONDE_SEGMENT_CALF && score->segment[i].needed;
   for (uint32_t i = 0; i < score->segment_count; ++i) {
     const sonde_segment_verdict *v = &score->segment[i];
-    score->called_thrombosis |= v->decision == SONDE_DECISION_CLOT;
-    if (v->needed) all &= v->decision == SONDE_DECISION_COMPRESSIBLE;
+    bool called = v->decision == SONDE_DECISION_CLOT;
+    bool deep = v->kind != SONDE_SEGMENT_SUPERFICIAL;
+    score->called_thrombosis |= called && deep;
+    score->thrombosis |=
+        v->truth == SONDE_DECISION_CLOT && deep && (calf || v->kind != SONDE_SEGMENT_CALF);
+    if (v->needed) all &= v->decision == SONDE_DECISION_COMPRESSIBLE || (called && !deep);
   }
-  score->thrombosis = truth->thrombosis;
   score->answered = score->called_thrombosis || all;
   score->correct = score->answered && score->called_thrombosis == score->thrombosis;
 

@@ -88,6 +88,7 @@ void sonde_put_result(sonde_json_out *out, const sonde_exam_report *exam) {
   sonde_json_begin_list(out, "segments");
   for (uint32_t i = 0; i < exam->score->segment_count; ++i) {
     const sonde_segment_verdict *v = &exam->score->segment[i];
+    if (v->kind != SONDE_SEGMENT_MAIN && !v->needed) continue;
     sonde_json_begin_object(out, NULL);
     sonde_json_put_text(out, "id", v->name);
     sonde_json_put_text(out, "title", sonde_segment_title(v->name));

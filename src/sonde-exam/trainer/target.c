@@ -30,10 +30,12 @@ static sonde_pose straight_above(const sonde_vein_point *p, double depth_m) {
                       q_from_matrix(m_columns(x, v_cross(z, x), z))};
 }
 
-// Presses a healthy vein. @return the force at which its area passes `closed_ratio` of that at
-// rest, between two looks; NaN: it never does
-static double find_closing_force(sonde_bench *bench, const sonde_vein_point *at,
-                                 double closed_ratio) {
+// Presses healthy veins: at a station those of all its places. @return the force at which the area
+// passes `closed_ratio` of that at rest, between two looks; NaN: it never does
+static double find_closing_force(sonde_bench *bench, const sonde_plan *plan,
+                                 const sonde_vein_map *map, uint32_t place) {
+  const sonde_vein_point *at = &plan->point[place].at;
+  const double closed_ratio = plan->criteria.closed_ratio;
   double depth_m = -LIFT_M, before_n = 0, before = 1;
   while (depth_m < DEEPEST_M) {
     sonde_pose pose = straight_above(at, depth_m);
@@ -43,7 +45,10 @@ static double find_closing_force(sonde_bench *bench, const sonde_vein_point *at,
       sonde_bench_step(bench, pose);
     }
     sonde_snapshot s = sonde_bench_look(bench, pose);
-    double ratio = sonde_vein_ratio(&s);
+    double ratio = sonde_segment_ratio(map, plan->point[place].segment, &s, NULL);
+    for (uint32_t i = 0; i < plan->count && isfinite(ratio); ++i)
+      if (sonde_same_stand(&plan->point[i], &plan->point[place]))
+        ratio = fmax(ratio, sonde_segment_ratio(map, plan->point[i].segment, &s, NULL));
     if (s.force_normal_n > FORCE_MOST_N) break;
     if (!isfinite(ratio)) continue;
     if (ratio <= closed_ratio) {
@@ -68,10 +73,13 @@ sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *s
     sonde_plan_point *point = &plan->point[i];
     if (!sonde_progress_report(progress, (double)i / plan->count, point->title))
       return sonde_fail(error, SONDE_CANCELLED, "cancelled");
+    uint32_t known = 0;
+    while (known < i && !sonde_same_stand(&plan->point[known], point)) ++known;
+    point->target = plan->point[known].target;
+    if (known < i) continue;
     sonde_bench bench;
     status = sonde_bench_open(&bench, &healthy, &findings, true, error);
-    double closes_n =
-        status ? 0 : find_closing_force(&bench, &point->at, plan->criteria.closed_ratio);
+    double closes_n = status ? 0 : find_closing_force(&bench, plan, &setup->map, i);
     sonde_bench_close(&bench);
     if (status) return status;
     if (!isfinite(closes_n))

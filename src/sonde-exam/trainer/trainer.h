@@ -7,10 +7,18 @@
 #include "files/yaml.h"
 #include "sonde/trainer_operator.h"
 
+// Segments that are named at all, those of the main vein first; vessels of an interior before its
+// branches.
+enum { TRAINER_SEGMENTS = 13, MAIN_SEGMENTS = 8, TRAINER_FIRST_BRANCH = 2 };
+// @param kind what a clot there means; may be NULL
+const char *sonde_segment_known(uint32_t i, sonde_segment_kind *kind);
+// The segment that a branch belongs to; NULL: none.
+const char *sonde_segment_of_branch(const char *branch);
+
 // Copies a text of a map into a member of `size` bytes; too long a text is an error.
 void sonde_read_member(sonde_reader *reader, sonde_place map, const char *key, bool needed,
                        char *to, size_t size);
-// A station: a number of mm from the groin end, or {segment, share, shift_mm}.
+// A place: a number of mm from the groin end, or a map with station, landmark, segment or share.
 void sonde_read_station(sonde_reader *reader, sonde_place at, const char *what,
                         sonde_station *station);
 
@@ -24,6 +32,11 @@ sonde_status sonde_load_directory(const char *directory, size_t item_bytes, sond
 static inline double sonde_vein_ratio(const sonde_snapshot *s) {
   double first = s->vein_area_ratio;
   return isfinite(first) ? fmax(first, s->other_vein_ratio) : first;
+}
+
+// Places of one station: one press is at both.
+static inline bool sonde_same_stand(const sonde_plan_point *a, const sonde_plan_point *b) {
+  return a->station && b->station && v_distance(a->at.skin_m, b->at.skin_m) < 1e-9;
 }
 
 #endif

@@ -1,19 +1,57 @@
-// The vein as the examination knows it: the skin above every point of its course, and its segments.
+// The veins as the examination knows them: the skin above every point of the main vein's course,
+// the segments of all veins, the stations.
 #include "trainer/judge.h"
 
 #include <string.h>
 
 enum { DIRECTIONS = 120, SMOOTH = 4 };
 static const double REACH_M = 0.2;
+static const double FACE_HALF_M = 0.025; // half of the picture's width: veins farther aside are not
+                                         // in it
+enum { SLIDES = 6 };
+static const double SLIDE_M = 0.002;
 
 static const struct {
   const char *name, *title;
-  double to; // share of the course, for models without anatomy
-} SEGMENT[] = {{"common_femoral", "Common femoral vein", 0.16},
-               {"femoral_proximal", "Femoral vein, upper third", 0.40},
-               {"femoral_mid", "Femoral vein, middle", 0.65},
-               {"femoral_distal", "Femoral vein, lower third", 0.88},
-               {"popliteal", "Vein behind the knee", 1.0}};
+  double to; // share of the main vein's course, for models without anatomy; 0: another vein
+  sonde_segment_kind kind;
+  const char *vein[SONDE_SEGMENT_VEINS]; // branches of a limb
+} SEGMENT[] = {
+    {"common_femoral", "Common femoral vein", 0.16, SONDE_SEGMENT_MAIN, {0}},
+    {"femoral_proximal", "Femoral vein, upper third", 0.40, SONDE_SEGMENT_MAIN, {0}},
+    {"femoral_mid", "Femoral vein, middle", 0.65, SONDE_SEGMENT_MAIN, {0}},
+    {"femoral_distal", "Femoral vein, lower third", 0.88, SONDE_SEGMENT_MAIN, {0}},
+    {"popliteal", "Vein behind the knee", 1.0, SONDE_SEGMENT_MAIN, {0}},
+    {"deep_femoral", "Deep femoral vein", 0, SONDE_SEGMENT_DEEP, {"deep_femoral_vein"}},
+    {"tibioperoneal", "Tibioperoneal trunk", 0, SONDE_SEGMENT_CALF, {"tibioperoneal_trunk_vein"}},
+    {"posterior_tibial",
+     "Posterior tibial veins",
+     0,
+     SONDE_SEGMENT_CALF,
+     {"posterior_tibial_vein", "second_posterior_tibial_vein"}},
+    {"peroneal",
+     "Peroneal veins",
+     0,
+     SONDE_SEGMENT_CALF,
+     {"peroneal_vein", "second_peroneal_vein"}},
+    {"gastrocnemius",
+     "Gastrocnemius veins",
+     0,
+     SONDE_SEGMENT_CALF,
+     {"medial_gastrocnemius_vein", "second_medial_gastrocnemius_vein", "lateral_gastrocnemius_vein",
+      "second_lateral_gastrocnemius_vein"}},
+    {"soleal",
+     "Soleal veins",
+     0,
+     SONDE_SEGMENT_CALF,
+     {"medial_soleal_vein", "central_soleal_vein", "lateral_soleal_vein"}},
+    {"great_saphenous",
+     "Great saphenous vein",
+     0,
+     SONDE_SEGMENT_SUPERFICIAL,
+     {"great_saphenous", "second_great_saphenous"}},
+    {"small_saphenous", "Small saphenous vein", 0, SONDE_SEGMENT_SUPERFICIAL, {"small_saphenous"}}};
+_Static_assert(SONDE_COUNT_OF(SEGMENT) == TRAINER_SEGMENTS, "a row for each name");
 
 const char *sonde_segment_title(const char *name) {
   for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i)
@@ -21,8 +59,22 @@ const char *sonde_segment_title(const char *name) {
   return name;
 }
 
-// The skin above every point. The leg runs along z, and the ends of the model are not skin, so the
-// nearest skin is looked for across the leg; directions are averaged along the vein.
+const char *sonde_segment_known(uint32_t i, sonde_segment_kind *kind) {
+  SONDE_ASSERT(i < TRAINER_SEGMENTS);
+  if (kind) *kind = SEGMENT[i].kind;
+  return SEGMENT[i].name;
+}
+
+const char *sonde_segment_of_branch(const char *branch) {
+  for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i)
+    for (size_t k = 0; k < SONDE_SEGMENT_VEINS && SEGMENT[i].vein[k]; ++k)
+      if (strcmp(SEGMENT[i].vein[k], branch) == 0) return SEGMENT[i].name;
+  return NULL;
+}
+
+// The skin above every point, and the direction across the vein. The leg runs along z, and the ends
+// of the model are not skin, so the nearest skin is looked for across the leg; directions are
+// averaged along the vein.
 static sonde_status find_skin(const sonde_model *model, sonde_vein_map *map, sonde_error *error) {
   sonde_surface_index *skin;
   sonde_status status = sonde_surface_index_create(&model->surface, &skin, error);
@@ -51,8 +103,112 @@ static sonde_status find_skin(const sonde_model *model, sonde_vein_map *map, son
     p->skin_m = met ? hit.point_m : v_madd(p->vein_m, p->depth_m, p->normal);
     p->depth_m = v_distance(p->skin_m, p->vein_m);
   }
+  // Across the vein in the plane of the skin, as the nearest site has it, so that left and right of
+  // the image do not change between the two.
+  for (uint32_t k = 0; k < map->point_count && !status; ++k) {
+    sonde_vein_point *p = &map->point[k];
+    const sonde_vein_point *before = &map->point[k > 0 ? k - 1 : 0];
+    const sonde_vein_point *after = &map->point[k + 1 < map->point_count ? k + 1 : k];
+    sonde_vec3 course = v_sub(after->vein_m, before->vein_m);
+    course = v_madd(course, -v_dot(course, p->normal), p->normal);
+    p->across = v_cross(v_unit(course, vec3(0, 0, 1)), p->normal);
+    double nearest = INFINITY;
+    sonde_vec3 u = p->across;
+    for (uint32_t i = 0; i < model->site_count; ++i) {
+      double distance = v_distance(model->sites[i].position_m, p->skin_m);
+      if (distance < nearest) nearest = distance, u = model->sites[i].u;
+    }
+    if (v_dot(u, p->across) < 0) p->across = v_neg(p->across);
+  }
   sonde_surface_index_destroy(skin);
   return status;
+}
+
+// Where the plane of a probe cuts a line under its face, nearest to the beam; NaN: nowhere.
+static sonde_vec3 cross_line(const sonde_vessel *line, sonde_pose probe) {
+  const double none = (double)NAN;
+  double nearest = FACE_HALF_M;
+  sonde_vec3 found = vec3(none, none, none);
+  for (uint32_t i = 0; i + 1 < line->count; ++i) {
+    sonde_vec3 a = pose_apply_inverse(probe, line->point[i].centre_m);
+    sonde_vec3 b = pose_apply_inverse(probe, line->point[i + 1].centre_m);
+    if ((a.y > 0) == (b.y > 0)) continue;
+    double t = a.y / (a.y - b.y), aside_m = fabs(a.x + t * (b.x - a.x));
+    if (aside_m > nearest) continue;
+    nearest = aside_m;
+    found = v_lerp(line->point[i].centre_m, line->point[i + 1].centre_m, t);
+  }
+  return found;
+}
+
+// Stations of a limb in the model's frame: the probe as the limb has it, left and right of the
+// image as at the model's site.
+static void find_stations(const sonde_model *model, const sonde_limb *limb, sonde_vein_map *map) {
+  static const char *const OTHER[][2] = {{"posterior_tibial", "posterior_tibial"},
+                                         {"peroneal", "peroneal"},
+                                         {"gastrocnemius", "gastrocnemius"},
+                                         {"great_saphenous", "great_saphenous"},
+                                         {"small_saphenous", "small_saphenous"}};
+  sonde_limb_station station[SONDE_LIMB_STATIONS];
+  sonde_limb_stations(limb, station);
+  map->station_count = SONDE_LIMB_STATIONS;
+  SONDE_ASSERT(model->site_count >= SONDE_LIMB_STATIONS &&
+               map->landmark_count >= map->station_count);
+  for (uint32_t k = 0; k < map->station_count; ++k) {
+    sonde_map_station *to = &map->station[k];
+    sonde_vec3 x = q_rotate(station[k].probe.rotation, vec3(1, 0, 0));
+    sonde_vec3 z = q_rotate(station[k].probe.rotation, vec3(0, 0, 1));
+    x.z = -x.z, z.z = -z.z; // the model's z runs the other way
+    if (v_dot(x, model->sites[k].u) < 0) x = v_neg(x);
+    *to = (sonde_map_station){
+        .text = station[k].text,
+        .segment = SONDE_SEGMENTS,
+        .probe = {model->sites[k].position_m, q_from_matrix(m_columns(x, v_cross(z, x), z))}};
+    memcpy(to->name, map->landmark[k], sizeof to->name);
+    sonde_vec3 main_m = cross_line(&model->vein, to->probe);
+    for (size_t i = 0; i < SONDE_COUNT_OF(OTHER); ++i)
+      if (strcmp(OTHER[i][0], to->name) == 0) to->segment = sonde_vein_segment(map, OTHER[i][1]);
+    if (to->segment == SONDE_SEGMENTS && isfinite(main_m.z))
+      to->segment = sonde_vein_segment_at(map, main_m.z);
+    // A vein that begins or ends beside the station comes into view within a finger's breadth.
+    for (uint32_t i = 0; i < map->segment_count; ++i) {
+      const sonde_exam_segment *segment = &map->segment[i];
+      to->vein_m[i] = main_m;
+      for (int step = 0; segment->vein_count > 0 && step <= 2 * SLIDES; ++step) {
+        const int out = (step + 1) / 2;
+        sonde_pose probe = to->probe;
+        to->slide_m[i] = (step % 2 ? SLIDE_M : -SLIDE_M) * out;
+        sonde_vec3 y = q_rotate(probe.rotation, vec3(0, 1, 0)); // along the skin
+        probe.position = v_madd(probe.position, (y.z < 0 ? -1 : 1) * to->slide_m[i], y);
+        for (uint32_t v = segment->vein_count; v-- > 0;) {
+          const uint32_t branch = segment->vein[v] - TRAINER_FIRST_BRANCH;
+          sonde_vec3 at = cross_line(&model->anatomy->branch[branch].line, probe);
+          if (isfinite(at.z) || v + 1 == segment->vein_count) to->vein_m[i] = at;
+        }
+        if (isfinite(to->vein_m[i].z)) break;
+      }
+    }
+  }
+
+  // Middles of the leg: of the skin's extent across it, at equal steps of z.
+  const sonde_mesh *skin = &model->surface;
+  double low = INFINITY, high = -INFINITY;
+  for (uint32_t i = 0; i < skin->vertex_count; ++i) {
+    low = fmin(low, skin->vertices[i].z);
+    high = fmax(high, skin->vertices[i].z);
+  }
+  map->middle_z_m[0] = low, map->middle_z_m[1] = high;
+  for (uint32_t k = 0; k < SONDE_MAP_MIDDLES; ++k) {
+    const double step_m = (high - low) / (SONDE_MAP_MIDDLES - 1), z = low + k * step_m;
+    sonde_vec3 least = vec3(INFINITY, INFINITY, z), most = vec3(-INFINITY, -INFINITY, z);
+    for (uint32_t i = 0; i < skin->vertex_count; ++i)
+      if (fabs(skin->vertices[i].z - z) <= step_m) {
+        least = v_min(least, skin->vertices[i]);
+        most = v_max(most, skin->vertices[i]);
+      }
+    map->middle_m[k] = v_lerp(least, most, 0.5);
+    map->middle_m[k].z = z;
+  }
 }
 
 sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
@@ -72,23 +228,6 @@ sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
   }
   sonde_status status = find_skin(model, map, error);
 
-  // Across the vein in the plane of the skin, as the nearest site has it, so that left and right of
-  // the image do not change between the two.
-  for (uint32_t k = 0; k < map->point_count && !status; ++k) {
-    sonde_vein_point *p = &map->point[k];
-    const sonde_vein_point *before = &map->point[k > 0 ? k - 1 : 0];
-    const sonde_vein_point *after = &map->point[k + 1 < map->point_count ? k + 1 : k];
-    sonde_vec3 course = v_sub(after->vein_m, before->vein_m);
-    course = v_madd(course, -v_dot(course, p->normal), p->normal);
-    p->across = v_cross(v_unit(course, vec3(0, 0, 1)), p->normal);
-    double nearest = INFINITY;
-    sonde_vec3 u = p->across;
-    for (uint32_t i = 0; i < model->site_count; ++i) {
-      double distance = v_distance(model->sites[i].position_m, p->skin_m);
-      if (distance < nearest) nearest = distance, u = model->sites[i].u;
-    }
-    if (v_dot(u, p->across) < 0) p->across = v_neg(p->across);
-  }
   if (status) return status;
 
   // Segments, branches and landmarks that the model names; a model without anatomy gets the
@@ -96,10 +235,11 @@ sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
   const sonde_thigh_anatomy *anatomy = model->anatomy;
   double first = map->point[0].z_m, last = map->point[map->point_count - 1].z_m, from = first;
   double low = fmin(first, last), high = fmax(first, last);
-  for (uint32_t i = 0; anatomy && i < anatomy->segment_count; ++i) {
-    sonde_segment segment = anatomy->segment[i];
-    segment.from_m = fmax(segment.from_m, low);
-    segment.to_m = fmin(segment.to_m, high);
+  for (uint32_t i = 0; anatomy && i < anatomy->segment_count && i < MAIN_SEGMENTS; ++i) {
+    const sonde_segment *named = &anatomy->segment[i];
+    sonde_exam_segment segment = {.from_m = fmax(named->from_m, low),
+                                  .to_m = fmin(named->to_m, high)};
+    memcpy(segment.name, named->name, sizeof segment.name);
     if (segment.to_m > segment.from_m) map->segment[map->segment_count++] = segment;
   }
   map->branch_count = anatomy ? anatomy->branch_count : 0;
@@ -110,14 +250,36 @@ sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
     memcpy(map->landmark[i], anatomy->landmark[i].name, sizeof map->landmark[i]);
     map->landmark_z_m[i] = anatomy->landmark[i].vein_m.z;
   }
-  if (map->segment_count > 0) return SONDE_OK;
-  for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i) {
+  const bool named = map->segment_count > 0;
+  for (size_t i = 0; !named && i < SONDE_COUNT_OF(SEGMENT) && SEGMENT[i].to > 0; ++i) {
     double to = first + SEGMENT[i].to * (last - first);
-    sonde_segment *segment = &map->segment[map->segment_count++];
-    *segment = (sonde_segment){.from_m = fmin(from, to), .to_m = fmax(from, to)};
+    sonde_exam_segment *segment = &map->segment[map->segment_count++];
+    *segment = (sonde_exam_segment){.from_m = fmin(from, to), .to_m = fmax(from, to)};
     snprintf(segment->name, sizeof segment->name, "%s", SEGMENT[i].name);
     from = to;
   }
+
+  // Segments of veins beside the main one that the model has, in the order of the table.
+  for (size_t i = 0; anatomy && i < SONDE_COUNT_OF(SEGMENT); ++i) {
+    sonde_exam_segment *segment = &map->segment[map->segment_count];
+    *segment = (sonde_exam_segment){.from_m = INFINITY, .to_m = -INFINITY, .kind = SEGMENT[i].kind};
+    snprintf(segment->name, sizeof segment->name, "%s", SEGMENT[i].name);
+    for (size_t k = 0; k < SONDE_SEGMENT_VEINS && SEGMENT[i].vein[k]; ++k)
+      for (uint32_t b = 0; b < anatomy->branch_count; ++b) {
+        const sonde_branch *branch = &anatomy->branch[b];
+        if (strcmp(branch->name, SEGMENT[i].vein[k]) != 0 || branch->line.count < 2) continue;
+        segment->vein[segment->vein_count++] = TRAINER_FIRST_BRANCH + b;
+        for (uint32_t p = 0; p < branch->line.count; ++p) {
+          segment->from_m = fmin(segment->from_m, branch->line.point[p].centre_m.z);
+          segment->to_m = fmax(segment->to_m, branch->line.point[p].centre_m.z);
+        }
+        break; // the first of that name
+      }
+    if (segment->vein_count > 0) map->segment_count++;
+  }
+  SONDE_ASSERT(map->segment_count <= SONDE_SEGMENTS);
+  const sonde_limb *limb = sonde_limb_of(model);
+  if (limb) find_stations(model, limb, map);
   return SONDE_OK;
 }
 
@@ -165,9 +327,28 @@ uint32_t sonde_vein_segment(const sonde_vein_map *map, const char *name) {
 }
 
 uint32_t sonde_vein_segment_at(const sonde_vein_map *map, double z_m) {
-  for (uint32_t i = 0; i < map->segment_count; ++i)
+  for (uint32_t i = 0; i < map->segment_count && map->segment[i].vein_count == 0; ++i)
     if (z_m >= map->segment[i].from_m && z_m <= map->segment[i].to_m) return i;
   return SONDE_SEGMENTS;
+}
+
+double sonde_segment_ratio(const sonde_vein_map *map, uint32_t segment,
+                           const sonde_snapshot *snapshot, sonde_vec3 *rest_m) {
+  SONDE_ASSERT(map && segment < map->segment_count && snapshot);
+  const sonde_exam_segment *of = &map->segment[segment];
+  if (of->vein_count == 0) {
+    if (rest_m) *rest_m = snapshot->vein_rest_m;
+    return sonde_vein_ratio(snapshot);
+  }
+  double ratio = (double)NAN;
+  for (uint32_t v = 0; v < of->vein_count; ++v)
+    for (uint32_t i = 0; i < snapshot->crossing_count; ++i) {
+      const sonde_vein_crossing *cut = &snapshot->crossing[i];
+      if (cut->vessel != of->vein[v] || !(fabs(cut->aside_m) <= FACE_HALF_M)) continue;
+      if (isnan(ratio) && rest_m) *rest_m = cut->rest_m;
+      ratio = fmax(ratio, cut->area_ratio);
+    }
+  return ratio;
 }
 
 void sonde_vein_segment_ends(const sonde_vein_map *map, uint32_t segment, double *from_m,
@@ -183,13 +364,30 @@ sonde_status sonde_station_find(const sonde_station *station, const sonde_vein_m
                                 double *along_m, sonde_error *error) {
   SONDE_ASSERT(station && map && along_m);
   double base = 0;
-  if (station->landmark[0]) {
-    uint32_t i = 0;
-    while (i < map->landmark_count && strcmp(map->landmark[i], station->landmark) != 0) ++i;
-    if (i == map->landmark_count)
-      return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no landmark '%s'",
-                        station->landmark);
-    base = sonde_vein_along(map, map->landmark_z_m[i]);
+  if (station->of_branch)
+    return sonde_fail(error, SONDE_ARGUMENT, "a share without a segment is one of a branch");
+  // On a thigh a station is the landmark of its name, or the middle of the segment of its name.
+  const bool stands = station->station[0] != 0;
+  const char *mark = stands ? station->station : station->landmark;
+  uint32_t at = 0;
+  while (at < map->landmark_count && strcmp(map->landmark[at], mark) != 0) ++at;
+  const bool marked = mark[0] && at < map->landmark_count;
+  if (marked && stands && map->station_count > 0) {
+    const sonde_map_station *there = &map->station[at];
+    if (there->segment >= map->segment_count || map->segment[there->segment].vein_count > 0)
+      return sonde_fail(error, SONDE_NOT_FOUND, "the station '%s' is not on the main vein", mark);
+  }
+  if (marked) {
+    base = sonde_vein_along(map, map->landmark_z_m[at]);
+  } else if (stands) {
+    uint32_t i = sonde_vein_segment(map, mark);
+    if (i == SONDE_SEGMENTS)
+      return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no station '%s'", mark);
+    double from, to;
+    sonde_vein_segment_ends(map, i, &from, &to);
+    base = 0.5 * (from + to);
+  } else if (station->landmark[0]) {
+    return sonde_fail(error, SONDE_NOT_FOUND, "the thigh has no landmark '%s'", mark);
   } else if (station->segment[0]) {
     uint32_t i = sonde_vein_segment(map, station->segment);
     if (i == SONDE_SEGMENTS)
