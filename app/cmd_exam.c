@@ -35,7 +35,7 @@ static const app_option TABLE[] = {
         "journals of finished exams whose result or report is missing to make them again. Exams "
         "that run are left alone"),
     OPT_FLAG(solid, "solid",
-             "the inside by finite elements, as in real time, instead of columns; slower"),
+             "in a thigh, the inside by finite elements, as always in a limb, instead of columns"),
     OPT_TEXT(cases, "cases", "DIR", "cases from there instead of those that ship"),
     OPT_TEXT(protocols, "protocols", "DIR", "protocols from there instead of those that ship"),
     OPT_TEXT(directory, "o,output", "DIR",
