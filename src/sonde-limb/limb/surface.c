@@ -239,57 +239,75 @@ static void recentre(double *x, double *y, double *radius) {
   }
 }
 
-// The fascia of a row: what the bones add and what the size loses by them, spread over neighbouring
-// rows, and outside every bone.
-static void spread_push(const limb_surface *s, double (*pushed)[LIMB_ANGLES],
-                        double (*bone)[LIMB_ANGLES], uint32_t r, double fascia[LIMB_ANGLES]) {
+// The fascia of all rows: what the bones add and what the size loses by them, spread over
+// neighbouring rows, and outside every bone. `extra` is room for what the bones reach beyond that.
+static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
+                        double (*bone)[LIMB_ANGLES], double (*extra)[LIMB_ANGLES],
+                        double (*fascia)[LIMB_ANGLES]) {
   enum { SPREAD = 6 };
-  const double level = LIMB_TOP + r * LIMB_STEP;
-  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-    double sum = 0, weights = 0;
-    for (int k = -SPREAD; k <= SPREAD; ++k) {
-      int row = (int)r + k;
-      if (row < 0 || row >= LIMB_ROWS) continue;
-      double w = SPREAD + 1 - abs(k);
-      sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
+  const limb_surface *s = &limb->surface;
+  for (uint32_t r = 0; r < LIMB_ROWS; ++r)
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+      const double level = LIMB_TOP + r * LIMB_STEP;
+      double sum = 0, weights = 0;
+      for (int k = -SPREAD; k <= SPREAD; ++k) {
+        int row = (int)r + k;
+        if (row < 0 || row >= LIMB_ROWS) continue;
+        double w = SPREAD + 1 - abs(k);
+        sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
+      }
+      // Also what reaches the rows and, at pelvis and patella, the angles beside.
+      double reach = 0;
+      int aside = level < 0.15 || fabs(level - 0.95) < 0.1 || level > 1.9 ? 1 : 0;
+      for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
+        for (int q = -aside; q <= aside; ++q)
+          reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
+      fascia[r][c] = s->fascia[r][c] + sum / weights;
+      extra[r][c] = fmax(reach - fascia[r][c], 0);
     }
-    // Also what reaches the rows and, at pelvis and patella, the angles beside.
-    double reach = 0;
-    int aside = level < 0.15 || fabs(level - 0.95) < 0.1 || level > 1.9 ? 1 : 0;
-    for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
-      for (int q = -aside; q <= aside; ++q)
-        reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
-    fascia[c] = fmax(s->fascia[r][c] + sum / weights, reach);
-  }
+  // Above the thigh the fascia leaves a bone gently along the limb: what it stands forward over the
+  // ramus ends 60 mm away, with a radius of curvature of 100 mm for 6 mm of height.
+  const double gently_m = 0.06 * limb->scale, thigh = 0.15;
+  for (uint32_t r = 0; r < LIMB_ROWS; ++r)
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+      double most = extra[r][c];
+      for (uint32_t k = 0; LIMB_TOP + k * LIMB_STEP < thigh; ++k) {
+        double away = fabs((double)r - k) * LIMB_STEP * limb->body.thigh_length_m / gently_m;
+        most = fmax(most, extra[k][c] * (1 - smooth_step(away)));
+      }
+      fascia[r][c] += most;
+    }
   // At the groin the skin runs from the thigh over the fat in front of the ramus to the middle of
   // the body: the contour has no hollow beside the bone. Chords over every side of the ray bound
   // it.
   const double from = 0.12, to = 0.22;
-  const double share = 1 - smooth_step((level - from) / (to - from));
-  double x[LIMB_ANGLES], y[LIMB_ANGLES], hull[LIMB_ANGLES];
-  if (share <= 0) return;
-  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-    double a = 2 * SONDE_PI * c / LIMB_ANGLES;
-    x[c] = fascia[c] * sin(a), y[c] = fascia[c] * cos(a), hull[c] = fascia[c];
+  for (uint32_t r = 0; LIMB_TOP + r * LIMB_STEP < to; ++r) {
+    const double share = 1 - smooth_step((LIMB_TOP + r * LIMB_STEP - from) / (to - from));
+    double x[LIMB_ANGLES], y[LIMB_ANGLES], hull[LIMB_ANGLES];
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+      double a = 2 * SONDE_PI * c / LIMB_ANGLES;
+      hull[c] = fascia[r][c], x[c] = hull[c] * sin(a), y[c] = hull[c] * cos(a);
+    }
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
+      double a = 2 * SONDE_PI * c / LIMB_ANGLES, dx = sin(a), dy = cos(a);
+      for (uint32_t i = 1; i < LIMB_ANGLES / 2; ++i)
+        for (uint32_t j = 1; i + j < LIMB_ANGLES / 2; ++j) {
+          uint32_t p = (c + LIMB_ANGLES - i) % LIMB_ANGLES, q = (c + j) % LIMB_ANGLES;
+          double left = dy * x[p] - dx * y[p], right = dy * x[q] - dx * y[q];
+          double u = left / (left - right);
+          hull[c] =
+              fmax(hull[c], (x[p] + u * (x[q] - x[p])) * dx + (y[p] + u * (y[q] - y[p])) * dy);
+        }
+    }
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) fascia[r][c] += share * (hull[c] - fascia[r][c]);
   }
-  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-    double a = 2 * SONDE_PI * c / LIMB_ANGLES, dx = sin(a), dy = cos(a);
-    for (uint32_t i = 1; i < LIMB_ANGLES / 2; ++i)
-      for (uint32_t j = 1; i + j < LIMB_ANGLES / 2; ++j) {
-        uint32_t p = (c + LIMB_ANGLES - i) % LIMB_ANGLES, q = (c + j) % LIMB_ANGLES;
-        double left = dy * x[p] - dx * y[p], right = dy * x[q] - dx * y[q];
-        double u = left / (left - right);
-        hull[c] = fmax(hull[c], (x[p] + u * (x[q] - x[p])) * dx + (y[p] + u * (y[q] - y[p])) * dy);
-      }
-  }
-  for (uint32_t c = 0; c < LIMB_ANGLES; ++c) fascia[c] += share * (hull[c] - fascia[c]);
 }
 
 sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
   SONDE_ASSERT(limb->bones);
   const sonde_limb_body *b = &limb->body;
   limb_surface *s = &limb->surface;
-  double(*around)[LIMB_ANGLES] = sonde_calloc((size_t)4 * LIMB_ROWS, sizeof *around);
+  double(*around)[LIMB_ANGLES] = sonde_calloc((size_t)5 * LIMB_ROWS, sizeof *around);
   if (!around) return sonde_fail_memory(error);
   double outside[LIMB_ANGLES], none[LIMB_ANGLES] = {0};
   // Sections as if there were no bones.
@@ -327,7 +345,8 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
   // The fascia passes outside the bones; the girth stays. What the bones add and what the size
   // loses by them are spread over neighbouring rows, so that the skin has no edge there.
   double(*bone)[LIMB_ANGLES] = &around[LIMB_ROWS], (*pushed)[LIMB_ANGLES] = &around[2 * LIMB_ROWS];
-  double(*fascia)[LIMB_ANGLES] = &around[3 * LIMB_ROWS];
+  double(*fascia)[LIMB_ANGLES] = &around[3 * LIMB_ROWS],
+  (*extra)[LIMB_ANGLES] = &around[4 * LIMB_ROWS];
   for (uint32_t pass = 0; pass < 2; ++pass) {
     for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
       double level = LIMB_TOP + r * LIMB_STEP;
@@ -350,7 +369,7 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
       }
       fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
     }
-    for (uint32_t r = 0; r < LIMB_ROWS; ++r) spread_push(s, pushed, bone, r, fascia[r]);
+    spread_push(limb, pushed, bone, extra, fascia);
     // At the groin the section moves by what the push has taken from its front.
     for (size_t k = 0; k < SONDE_COUNT_OF(CENTRES) && pass == 0 && CENTRES[k][0] <= 0; ++k) {
       uint32_t row = (uint32_t)lround((CENTRES[k][0] - LIMB_TOP) / LIMB_STEP);
