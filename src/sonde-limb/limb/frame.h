@@ -37,6 +37,10 @@ struct sonde_limb {
   struct limb_muscles *muscles;
 };
 
+// As fmin() and fmax() of numbers, without a call.
+static inline double least_of(double a, double b) { return a < b ? a : b; }
+static inline double most_of(double a, double b) { return a > b ? a : b; }
+
 // z of a level and level of a z; linear beyond the ends.
 static inline double limb_z(const sonde_limb *limb, double level) {
   double thigh = limb->body.thigh_length_m, calf = limb->body.calf_length_m;

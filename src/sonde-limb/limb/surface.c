@@ -20,7 +20,7 @@ typedef struct place {
 
 static inline void place_level(double level, place *p) {
   double r = clamp((level - LIMB_TOP) / LIMB_STEP, 0, LIMB_ROWS - 1);
-  uint32_t k = (uint32_t)fmin(r, LIMB_ROWS - 2);
+  uint32_t k = (uint32_t)least_of(r, LIMB_ROWS - 2);
   for (uint32_t i = 0; i < 4; ++i) {
     uint32_t row = k + i > 0 ? k + i - 1 : 0;
     p->row[i] = row < LIMB_ROWS ? row : LIMB_ROWS - 1;
@@ -80,7 +80,7 @@ double limb_skin_radius(const sonde_limb *limb, double level, double angle) {
 
 double limb_deep_fat(const sonde_limb *limb, double level, double angle) {
   double whole = limb_fat(limb, level, angle);
-  return fmin(0.45 * whole, 0.003 + 0.2 * whole);
+  return least_of(0.45 * whole, 0.003 + 0.2 * whole);
 }
 
 void limb_point(const sonde_limb *limb, double level, double angle, double f, double xyz[3]) {
@@ -132,6 +132,10 @@ static double girth_at(const sonde_limb_body *b, double level) {
                              {1.86, log(b->girth_ankle_m / 0.217)}};
   return 1e-3 * KNOTS(PROFILE, 1, level) * exp(KNOTS(ratio, 1, level));
 }
+
+// From the femur's condyles to the roof of the popliteal fossa: artery 8.6 mm and vein 5 mm with
+// their walls, gaps of 2.1, 0.8 and 0.8 mm.
+static const double FOSSA_M = 0.018;
 
 // Fat along the ray: the logarithm of the thickness by two harmonics through the four sides.
 static double fat_at(const sonde_limb_body *b, double level, double angle) {
@@ -261,9 +265,9 @@ static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
       int aside = level < 0.15 || fabs(level - 0.95) < 0.1 || level > 1.9 ? 1 : 0;
       for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
         for (int q = -aside; q <= aside; ++q)
-          reach = fmax(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
+          reach = most_of(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
       fascia[r][c] = s->fascia[r][c] + sum / weights;
-      extra[r][c] = fmax(reach - fascia[r][c], 0);
+      extra[r][c] = most_of(reach - fascia[r][c], 0);
     }
   // Above the thigh the fascia leaves a bone gently along the limb: what it stands forward over the
   // ramus ends 60 mm away, with a radius of curvature of 100 mm for 6 mm of height.
@@ -273,7 +277,7 @@ static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
       double most = extra[r][c];
       for (uint32_t k = 0; LIMB_TOP + k * LIMB_STEP < thigh; ++k) {
         double away = fabs((double)r - k) * LIMB_STEP * limb->body.thigh_length_m / gently_m;
-        most = fmax(most, extra[k][c] * (1 - smooth_step(away)));
+        most = most_of(most, extra[k][c] * (1 - smooth_step(away)));
       }
       fascia[r][c] += most;
     }
@@ -296,7 +300,7 @@ static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
           double left = dy * x[p] - dx * y[p], right = dy * x[q] - dx * y[q];
           double u = left / (left - right);
           hull[c] =
-              fmax(hull[c], (x[p] + u * (x[q] - x[p])) * dx + (y[p] + u * (y[q] - y[p])) * dy);
+              most_of(hull[c], (x[p] + u * (x[q] - x[p])) * dx + (y[p] + u * (y[q] - y[p])) * dy);
         }
     }
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) fascia[r][c] += share * (hull[c] - fascia[r][c]);
@@ -354,17 +358,19 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
       sonde_vec3 centre = vec3(s->x[r], s->y[r], limb_z(limb, level));
       for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
         double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
-        // The farthest bone on the ray, with some tissue over it.
-        const double most = 1.5 * s->fascia[r][c], over = level < 0.15 ? 0.003 : 0.0012;
-        bone[r][c] = 0;
-        for (double reach = most, gap; reach > 0.2 * most; reach -= 0.8 * gap) {
+        // The farthest bone on the ray, with some tissue over it; behind the knee with room for the
+        // vessels and the nerve between the condyles and the roof of the popliteal fossa.
+        const double fossa = (1 - smooth_step((fabs(level - 0.95) - 0.06) / 0.1)) *
+                             (1 - smooth_step((fabs(angle - SONDE_PI) - 0.35) / 0.6));
+        const double over = (level < 0.15 ? 0.003 : 0.0012) + FOSSA_M * limb->scale * fossa;
+        double reach = 1.5 * s->fascia[r][c], least = 0.2 * reach, gap = 1;
+        for (; reach > least; reach -= 0.8 * gap) {
           const double p[3] = {centre.x + reach * sin(angle), centre.y + reach * cos(angle),
                                centre.z};
           gap = limb_bone_distance(limb, p, NULL) - over;
-          if (gap >= 1e-4) continue;
-          bone[r][c] = reach;
-          break;
+          if (gap < 1e-4) break;
         }
+        bone[r][c] = reach > least ? reach : 0;
         outside[c] = s->fat[r][c] + b->skin_m;
       }
       fit_section(around[r], bone[r], outside, girth_at(b, level), pushed[r]);
