@@ -15,7 +15,7 @@ static sonde_vec3 neck_end(const sonde_limb_body *b) {
 
 sonde_vec3 limb_shaft_axis(const sonde_limb_body *b, double level) {
   sonde_vec3 from = neck_end(b);
-  double z = -b->thigh_length_m * level, from_y = fmax(from.y, -0.012);
+  double z = -b->thigh_length_m * level, from_y = most_of(from.y, -0.012);
   double u = (z - from.z) / (-b->thigh_length_m - from.z), chord = 0.85 * b->thigh_length_m;
   double bow = u > 0 && u < 1 ? 0.5 * u * (1 - u) * chord * chord / b->bow_m : 0;
   double lateral = (1 - u) * from.x, forward = (1 - u) * from_y - 0.004 * u;
@@ -44,8 +44,8 @@ static void add_ellipsoid(maker *m, limb_solid_kind kind, sonde_vec3 centre, son
 }
 
 static void add_cone(maker *m, sonde_vec3 from, double r0, sonde_vec3 to, double r1) {
-  add(m, (limb_solid){LIMB_CONE, from, to, r0, r1, 0, fmin(from.z - r0, to.z - r1),
-                      fmax(from.z + r0, to.z + r1)});
+  add(m, (limb_solid){LIMB_CONE, from, to, r0, r1, 0, least_of(from.z - r0, to.z - r1),
+                      most_of(from.z + r0, to.z + r1)});
 }
 
 static void add_femur(maker *m, const sonde_limb *limb) {
@@ -157,7 +157,7 @@ static void add_lower(maker *m, const sonde_limb *limb) {
 
 static double sweep_distance(const limb_sweep *s, sonde_vec3 p) {
   double at = clamp((p.z - s->low) / (s->high - s->low), 0, 1) * (LIMB_SWEEP_ROWS - 1);
-  uint32_t k = (uint32_t)fmin(at, LIMB_SWEEP_ROWS - 2);
+  uint32_t k = (uint32_t)least_of(at, LIMB_SWEEP_ROWS - 2);
   double u = at - k, v = 1 - u;
   const limb_sweep_row *a = &s->row[k], *b = a + 1;
   double dx = p.x - (v * a->x + u * b->x), dy = p.y - (v * a->y + u * b->y);
@@ -171,10 +171,10 @@ static double sweep_distance(const limb_sweep *s, sonde_vec3 p) {
   }
   double x = dx / hx, y = dy / hy, k0 = sqrt(x * x + y * y);
   double gx = x / hx, gy = y / hy, k1 = sqrt(gx * gx + gy * gy);
-  double across = k1 < 1e-9 ? -fmin(hx, hy) : k0 * (k0 - 1) / k1;
-  double along = fmax(s->low - p.z, p.z - s->high);
+  double across = k1 < 1e-9 ? -least_of(hx, hy) : k0 * (k0 - 1) / k1;
+  double along = most_of(s->low - p.z, p.z - s->high);
   if (along > 0 && across > 0) return sqrt(along * along + across * across);
-  return fmax(along, across);
+  return most_of(along, across);
 }
 
 double limb_one_bone(const struct limb_bones *bones, uint32_t bone, sonde_vec3 p) {
@@ -183,7 +183,7 @@ double limb_one_bone(const struct limb_bones *bones, uint32_t bone, sonde_vec3 p
   double distance = 0.5;
   for (uint32_t i = bones->first[bone]; i < bones->first[bone + 1]; ++i) {
     const limb_solid *s = &bones->solid[i];
-    double gap = fmax(s->low - p.z, p.z - s->high), d;
+    double gap = most_of(s->low - p.z, p.z - s->high), d;
     if (gap > reach) {
       d = gap;
     } else if (s->kind == LIMB_SWEEP) {
@@ -198,19 +198,19 @@ double limb_one_bone(const struct limb_bones *bones, uint32_t bone, sonde_vec3 p
       sonde_vec3 from = v_sub(p, s->a);
       sonde_vec3 q = vec3(from.x / s->b.x, from.y / s->b.y, from.z / s->b.z);
       double k0 = v_norm(q), k1 = v_norm(vec3(q.x / s->b.x, q.y / s->b.y, q.z / s->b.z));
-      d = k1 < 1e-9 ? -fmin(s->b.x, fmin(s->b.y, s->b.z)) : k0 * (k0 - 1) / k1;
+      d = k1 < 1e-9 ? -least_of(s->b.x, least_of(s->b.y, s->b.z)) : k0 * (k0 - 1) / k1;
     }
     if (s->kind == LIMB_HOLLOW) {
-      double h = fmax(blend - fabs(distance + d), 0) / blend;
-      distance = fmax(distance, -d) + 0.25 * h * h * blend;
+      double h = most_of(blend - fabs(distance + d), 0) / blend;
+      distance = most_of(distance, -d) + 0.25 * h * h * blend;
       continue;
     }
     // Smooth union: a fillet of `blend` where two parts meet; edges of hollows are rounded alike.
-    double h = fmax(blend - fabs(distance - d), 0) / blend;
-    distance = fmin(distance, d) - 0.25 * h * h * blend;
+    double h = most_of(blend - fabs(distance - d), 0) / blend;
+    distance = least_of(distance, d) - 0.25 * h * h * blend;
   }
-  if (bone == SONDE_LIMB_PELVIS) return fmax(distance, p.z - bones->top);
-  return bone >= SONDE_LIMB_TIBIA ? fmax(distance, bones->foot - p.z) : distance;
+  if (bone == SONDE_LIMB_PELVIS) return most_of(distance, p.z - bones->top);
+  return bone >= SONDE_LIMB_TIBIA ? most_of(distance, bones->foot - p.z) : distance;
 }
 
 double limb_bone_distance(const sonde_limb *limb, const double xyz[3], int *which) {
@@ -220,7 +220,7 @@ double limb_bone_distance(const sonde_limb *limb, const double xyz[3], int *whic
   double least = INFINITY;
   int nearest = 0;
   for (uint32_t k = 0; k < SONDE_LIMB_BONES; ++k) {
-    double gap = fmax(bones->low[k] - p.z, p.z - bones->high[k]);
+    double gap = most_of(bones->low[k] - p.z, p.z - bones->high[k]);
     if (gap >= least) continue;
     double d = gap > 0.03 ? gap : limb_one_bone(bones, k, p);
     if (d < least) least = d, nearest = (int)k;
@@ -261,8 +261,8 @@ sonde_status limb_bones_make(sonde_limb *limb, sonde_error *error) {
     bones->low[bone] = INFINITY, bones->high[bone] = -INFINITY;
     for (uint32_t i = bones->first[bone]; i < bones->first[bone + 1]; ++i) {
       if (bones->solid[i].kind == LIMB_HOLLOW) continue;
-      bones->low[bone] = fmin(bones->low[bone], bones->solid[i].low - 0.003);
-      bones->high[bone] = fmax(bones->high[bone], bones->solid[i].high + 0.003);
+      bones->low[bone] = least_of(bones->low[bone], bones->solid[i].low - 0.003);
+      bones->high[bone] = most_of(bones->high[bone], bones->solid[i].high + 0.003);
     }
   }
   return SONDE_OK;

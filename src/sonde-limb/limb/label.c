@@ -55,7 +55,7 @@ sonde_limb_label sonde_limb_at(const sonde_limb *limb, sonde_vec3 point) {
     label.tissue = SONDE_LIMB_BONE, label.index = (uint32_t)bone;
     return label;
   }
-  if (limb->vessels) {
+  if (limb->vessels && !limb_vessels_clear(limb->vessels, xyz)) {
     static const sonde_limb_tissue PARTS[] = {SONDE_LIMB_OUTSIDE, SONDE_LIMB_LUMEN,
                                               SONDE_LIMB_WALL,    SONDE_LIMB_NERVE,
                                               SONDE_LIMB_NODE,    SONDE_LIMB_SHEATH};
@@ -143,10 +143,10 @@ limb_layers limb_layers_at(const sonde_limb *limb, sonde_vec3 p) {
       (limb_skin_radius(limb, level - rise, a) - limb_skin_radius(limb, level + rise, a) +
        (up.x - down.x) * sin(a) + (up.y - down.y) * cos(a)) /
       (up.z - down.z);
-  double slope = sqrt(1 + around * around + along * along), beyond = fmax(p.z - top, foot - p.z);
+  double slope = sqrt(1 + around * around + along * along), beyond = most_of(p.z - top, foot - p.z);
   double deep = fascia + limb_deep_fat(limb, level, a);
-  return (limb_layers){fmax((r - skin) / slope, beyond), fmax((r - deep) / slope, beyond),
-                       fmax((r - fascia) / slope, beyond)};
+  return (limb_layers){most_of((r - skin) / slope, beyond), most_of((r - deep) / slope, beyond),
+                       most_of((r - fascia) / slope, beyond)};
 }
 
 sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 point) {

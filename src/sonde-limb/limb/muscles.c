@@ -145,49 +145,61 @@ static void sample_section(const sonde_limb *limb, double level, double radius, 
       if (r > limb_fascia_radius(limb, level, atan2(x, y))) continue;
       const double p[3] = {c.x + radius * x, c.y + radius * y, c.z};
       if (limb_bone_distance(limb, p, NULL) < 0) continue;
-      if (limb->vessels && limb_vessels_bundle(limb->vessels, p) < 0) continue;
+      if (limb->vessels && !limb_vessels_clear(limb->vessels, p) &&
+          limb_vessels_bundle(limb->vessels, p) < 0)
+        continue;
       SONDE_ASSERT(s->count < SAMPLES);
       s->x[s->count] = (float)x, s->y[s->count++] = (float)y;
     }
 }
 
+// Seeds of the cells that a row and its two neighbours know: the others own nothing between them.
+typedef struct row_seeds {
+  uint32_t count;
+  uint8_t at[LIMB_SEEDS], cell[LIMB_SEEDS]; // in the row, of which cell
+  bool cells[LIMB_CELLS];
+} row_seeds;
+
 // Area of every cell in mean radii squared. A sample at a boundary counts for both sides by its
 // distance to it. `least` gets how much nearer a cell would have to be to own any sample.
-static void measure_cells(const struct limb_muscles *m, uint32_t row, const section *s,
-                          double *area, double *least) {
+static void measure_cells(const struct limb_muscles *m, uint32_t row, const row_seeds *known,
+                          const section *s, double *area, double *least) {
+  enum { LANES = 16 };
   float x[LIMB_SEEDS], y[LIMB_SEEDS], weight[LIMB_SEEDS], d[LIMB_SEEDS], nearer[LIMB_SEEDS];
-  for (uint32_t k = 0; k < LIMB_SEEDS; ++k) {
-    bool used = k < m->seed_count;
-    x[k] = used ? m->seed[row][k].x : 0, y[k] = used ? m->seed[row][k].y : 0;
-    weight[k] = used ? m->seed[row][k].weight : -1e6F, nearer[k] = 1e30F;
+  const uint32_t all = (known->count + LANES - 1) / LANES * LANES;
+  for (uint32_t k = 0; k < all; ++k) {
+    const limb_seed *seed = k < known->count ? &m->seed[row][known->at[k]] : NULL;
+    x[k] = seed ? seed->x : 0, y[k] = seed ? seed->y : 0;
+    weight[k] = seed ? seed->weight : -1e6F, nearer[k] = 1e30F;
   }
   memset(area, 0, LIMB_CELLS * sizeof *area);
   for (uint32_t i = 0; i < s->count; ++i) {
     float px = s->x[i], py = s->y[i], d1 = 1e30F, d2 = 1e30F;
-    for (uint32_t k = 0; k < LIMB_SEEDS; ++k) {
+    for (uint32_t k = 0; k < all; ++k) {
       float dx = px - x[k], dy = py - y[k];
       d[k] = dx * dx + dy * dy - weight[k];
     }
     uint32_t first = 0, second = 0;
-    for (uint32_t k = 0; k < m->seed_count; ++k) {
+    for (uint32_t k = 0; k < known->count; ++k) {
       if (d[k] >= d2) continue;
       if (d[k] < d1) {
-        if (m->cell_of[k] != m->cell_of[first]) d2 = d1, second = first;
+        if (known->cell[k] != known->cell[first]) d2 = d1, second = first;
         d1 = d[k], first = k;
-      } else if (m->cell_of[k] != m->cell_of[first]) {
+      } else if (known->cell[k] != known->cell[first]) {
         d2 = d[k], second = k;
       }
     }
-    for (uint32_t k = 0; k < LIMB_SEEDS; ++k)
-      nearer[k] = d[k] - d1 < nearer[k] ? d[k] - d1 : nearer[k];
-    double apart = hypot((double)(x[first] - x[second]), (double)(y[first] - y[second])) + 1e-6;
-    double part = fmin(1, 0.5 + 0.5 * (d2 - d1) / apart / s->spacing);
-    area[m->cell_of[first]] += part * s->cell_area;
-    area[m->cell_of[second]] += (1 - part) * s->cell_area;
+    for (uint32_t k = 0; k < all; ++k) nearer[k] = d[k] - d1 < nearer[k] ? d[k] - d1 : nearer[k];
+    float sx = x[first] - x[second], sy = y[first] - y[second];
+    double apart = (double)sqrtf(sx * sx + sy * sy) + 1e-6;
+    double part = 0.5 + 0.5 * (double)(d2 - d1) / apart / s->spacing;
+    part = part < 1 ? part : 1;
+    area[known->cell[first]] += part * s->cell_area;
+    area[known->cell[second]] += (1 - part) * s->cell_area;
   }
   for (uint32_t k = 0; k < LIMB_CELLS; ++k) least[k] = INFINITY;
-  for (uint32_t k = 0; k < m->seed_count; ++k)
-    least[m->cell_of[k]] = fmin(least[m->cell_of[k]], nearer[k]);
+  for (uint32_t k = 0; k < known->count; ++k)
+    least[known->cell[k]] = fmin(least[known->cell[k]], nearer[k]);
 }
 
 static void set_weight(struct limb_muscles *m, uint32_t row, uint32_t cell, double by) {
@@ -197,18 +209,21 @@ static void set_weight(struct limb_muscles *m, uint32_t row, uint32_t cell, doub
 
 // Weights that give each cell its target: damped steps, each cell by its own error; an absent cell
 // keeps the greatest weight at which it owns nothing.
-static void solve_row(struct limb_muscles *m, uint32_t row, const section *s) {
+static void solve_row(struct limb_muscles *m, uint32_t row, const row_seeds *known,
+                      const section *s) {
   double unit = m->radius[row] * m->radius[row], area[LIMB_CELLS], least[LIMB_CELLS];
   double gain[LIMB_CELLS], before[LIMB_CELLS] = {0};
   for (uint32_t k = 0; k < LIMB_CELLS; ++k) gain[k] = 0.45;
   for (uint32_t pass = 0; pass < 70; ++pass) {
-    measure_cells(m, row, s, area, least);
+    measure_cells(m, row, known, s, area, least);
     double worst = 0;
     for (uint32_t k = 0; k < LIMB_CELLS; ++k) {
       double wanted = m->target[row][k] / unit, error = wanted - area[k];
+      if (!known->cells[k]) continue;
       if (wanted <= 0) {
-        // Absent: just out of every sample's reach.
-        set_weight(m, row, k, area[k] > 0 ? -0.03 - 0.5 * area[k] : fmin(least[k] - 0.04, 0.1));
+        // Absent: just out of every sample's reach; in the first pass at once.
+        double out = least[k] - 0.04;
+        set_weight(m, row, k, area[k] > 0 ? -0.03 - 0.5 * area[k] : pass ? fmin(out, 0.1) : out);
         worst = fmax(worst, area[k] > 0 ? area[k] / 0.004 * 0.02 : 0);
         continue;
       }
@@ -227,13 +242,19 @@ static void solve_row(struct limb_muscles *m, uint32_t row, const section *s) {
   }
   // What is absent goes entirely; its neighbours gain less than a sample.
   for (uint32_t pass = 0, owned = 1; pass < 40 && owned; ++pass) {
-    measure_cells(m, row, s, area, least);
+    measure_cells(m, row, known, s, area, least);
     owned = 0;
     for (uint32_t k = 0; k < LIMB_CELLS; ++k)
-      if (m->target[row][k] <= 0 && (area[k] > 0 || least[k] < 0.03))
+      if (known->cells[k] && m->target[row][k] <= 0 && (area[k] > 0 || least[k] < 0.03))
         set_weight(m, row, k, -0.02 - area[k]), owned = 1;
   }
   for (uint32_t k = 0; k < LIMB_CELLS; ++k) m->area[row][k] = area[k] * unit;
+}
+
+// Share of the section that fat of a kind takes by its table; little counts as none.
+static double filler_share(uint32_t kind, double level) {
+  double share = KNOTS(FILLERS[kind].share, 1, level);
+  return share < 0.003 ? 0 : share;
 }
 
 sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
@@ -264,9 +285,19 @@ sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
     }
     for (uint32_t c = 0; c < LIMB_FILLERS; at += FILLERS[c++].seeds)
       place_seeds(limb, level, FILLERS[c].knot, 3, FILLERS[c].seeds, row, at);
-    // Weights begin at those of the row above.
-    for (uint32_t k = 0; row && k < m->seed_count; ++k)
-      m->seed[row][k].weight = m->seed[row - 1][k].weight;
+    // Weights begin at those of the row above, below all others where that did not know the cell.
+    row_seeds known = {0};
+    for (uint32_t k = 0; k < m->seed_count; ++k) {
+      const uint32_t c = m->cell_of[k], muscle = c < SONDE_LIMB_MUSCLES;
+      for (int beside = -1; beside <= 1 && !known.cells[c]; ++beside) {
+        double at_level = level + beside * LIMB_CELL_STEP;
+        known.cells[c] = muscle ? limb_muscle_area(&limb->body, c, at_level) >= LEAST_AREA
+                                : filler_share(c - SONDE_LIMB_MUSCLES, at_level) > 0;
+      }
+      if (known.cells[c])
+        known.at[known.count] = (uint8_t)k, known.cell[known.count++] = (uint8_t)c;
+      m->seed[row][k].weight = !known.cells[c] ? -1 : row ? m->seed[row - 1][k].weight : 0;
+    }
     sample_section(limb, level, mean, s);
     // Areas of the row: muscles by their rule times a common scale, fat for its share and for what
     // muscle does not fill.
@@ -278,8 +309,7 @@ sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
       muscle += m->target[row][k];
     }
     for (uint32_t k = 0; k < LIMB_FILLERS; ++k) {
-      share[k] = KNOTS(FILLERS[k].share, 1, level);
-      if (share[k] < 0.003) share[k] = 0;
+      share[k] = filler_share(k, level);
       fat += share[k];
     }
     double scale = muscle > 0 ? (1 - fat) * room / muscle : 1;
@@ -293,7 +323,7 @@ sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
     for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) m->target[row][k] *= scale;
     for (uint32_t k = 0; k < LIMB_FILLERS; ++k)
       m->target[row][SONDE_LIMB_MUSCLES + k] = share[k] * room;
-    solve_row(m, row, s);
+    solve_row(m, row, &known, s);
   }
   for (uint32_t row = 0; row + 1 < LIMB_CELL_ROWS; ++row)
     for (uint32_t k = 0; k < m->seed_count; ++k) {

@@ -25,6 +25,9 @@ sonde_status limb_vessels_make(sonde_limb *limb, sonde_error *error);
 void limb_vessels_destroy(struct limb_vessels *vessels);
 // What is at a point of a right limb. NULL vessels: nothing.
 limb_vessel_hit limb_vessels_at(const struct limb_vessels *vessels, const double xyz[3]);
+// Whether a point is so far from every vessel, nerve and node that none of them nor the fat around
+// it is there. False also where they may be.
+bool limb_vessels_clear(const struct limb_vessels *vessels, const double xyz[3]);
 const char *limb_vessels_name(const struct limb_vessels *vessels, limb_part part, uint32_t index);
 
 // Distance to the outer face of the nearest deep bundle (wall, nerve) of a right limb that muscles

@@ -113,6 +113,7 @@ typedef struct vessel_piece {
 typedef struct vessel_cell {
   uint32_t child;        // first of eight, or 0: a leaf
   uint32_t first, count; // of a leaf, in listed[]
+  float clear;           // of a leaf: no point of it is nearer to a piece, m
 } vessel_cell;
 
 typedef struct limb_nerve {

@@ -4,14 +4,16 @@
 
 #include <string.h>
 
-enum { LEAF_PIECES = 12, DEEPEST = 7 };
+enum { LEAF_PIECES = 24, DEEPEST = 7 };
 // A cube farther than 50 mm from every piece keeps the one that is nearest to its middle; one with
 // few pieces stays whole where they are far for its size.
-enum { FAR_PIECES = 24 };
-static const double FAR_M = 0.05, FAR = 2;
+enum { FAR_PIECES = 64 };
+static const double FAR_M = 0.05, FAR = 1;
 static const double SLACK_M =
     0.0025; // by which a piece may be farther than the nearest and still count
 static const double SHEATH_M = 0.0009; // loose fat around the walls of deep vessels
+// More than a wall, its sheath in the groin and the rounding of a joint together: 1.3 + 2.4 + 0.5.
+static const double CLEAR_M = 0.006;
 
 // Signed distance of a point to a piece; *t: place between its ends.
 static inline double piece_distance(const vessel_piece *p, sonde_vec3 at, double *t) {
@@ -64,8 +66,8 @@ static void split(growing *g, uint32_t cell, const uint32_t *from, uint32_t coun
   for (uint32_t k = 0; k < count && !g->failed; ++k) {
     const vessel_piece *piece = &v->piece[from[k]];
     distance[k] = piece_distance(piece, middle, &t);
-    least = fmin(least, distance[k]);
-    if (piece->owner < v->branches) nearest_vessel = fmin(nearest_vessel, distance[k]);
+    least = least_of(least, distance[k]);
+    if (piece->owner < v->branches) nearest_vessel = least_of(nearest_vessel, distance[k]);
   }
   // Nerves count where they are nearer than vessels; joints are rounded near them only.
   for (uint32_t k = 0; k < count && !g->failed; ++k) {
@@ -80,14 +82,14 @@ static void split(growing *g, uint32_t cell, const uint32_t *from, uint32_t coun
       (depth >= DEEPEST || n <= LEAF_PIECES || (n <= FAR_PIECES && least > FAR * reach))) {
     if (reserve(g, (void **)(void *)&v->listed, &g->list_room, v->listed_count + n,
                 sizeof *v->listed)) {
-      v->cell[cell] = (vessel_cell){0, v->listed_count, n};
+      v->cell[cell] = (vessel_cell){0, v->listed_count, n, (float)(least - reach)};
       memcpy(v->listed + v->listed_count, kept, n * sizeof *kept);
       v->listed_count += n;
     }
   } else if (!g->failed &&
              reserve(g, (void **)(void *)&v->cell, &g->cell_room, v->cells + 8, sizeof *v->cell)) {
     uint32_t child = v->cells;
-    v->cell[cell] = (vessel_cell){child, 0, 0};
+    v->cell[cell] = (vessel_cell){child, 0, 0, 0};
     v->cells += 8;
     for (uint32_t k = 0; k < 8 && !g->failed; ++k) {
       double h = 0.5 * half;
@@ -125,7 +127,7 @@ sonde_status limb_vessels_index(struct limb_vessels *v, sonde_error *error) {
   for (uint32_t k = 0; k < v->pieces; ++k)
     low = v_min(low, v->piece[k].a), high = v_max(high, v->piece[k].a);
   double margin = 0.04,
-         edge = fmax(high.z - low.z, fmax(high.x - low.x, high.y - low.y)) + 2 * margin;
+         edge = most_of(high.z - low.z, most_of(high.x - low.x, high.y - low.y)) + 2 * margin;
   v->low = v_sub(v_scale(v_add(low, high), 0.5), vec3(edge / 2, edge / 2, edge / 2));
   v->edge = edge;
   growing g = {v, 0, 0, false};
@@ -153,7 +155,7 @@ typedef struct nearest {
 // Smooth minimum of two tubes around their joint: k = 0.3 radii there, fading within 3.5 radii.
 static double rounded(const struct limb_vessels *v, sonde_vec3 p, uint32_t a, double da, uint32_t b,
                       double db) {
-  double least = fmin(da, db);
+  double least = least_of(da, db);
   for (uint32_t k = 0; k < 2; ++k) {
     if (!v->shared[a][b][k]) continue;
     uint32_t node = v->shared[a][b][k] - 1u;
@@ -162,10 +164,35 @@ static double rounded(const struct limb_vessels *v, sonde_vec3 p, uint32_t a, do
     const vessel_place *end = &v->place[child->first];
     if (end->node != node) end += child->count - 1;
     double radius = end->radius, far = v_distance(p, v->node[node]) / (3.5 * radius + 1e-9);
-    double width = 0.3 * radius * clamp(2 - 2 * far, 0, 1), h = fmax(width - fabs(da - db), 0);
-    if (width > 0) least = fmin(least, fmin(da, db) - 0.25 * h * h / width);
+    double width = 0.3 * radius * clamp(2 - 2 * far, 0, 1), h = most_of(width - fabs(da - db), 0);
+    if (width > 0) least = least_of(least, least_of(da, db) - 0.25 * h * h / width);
   }
   return least;
+}
+
+// Down to the leaf of a point; a point outside of the cube takes that of its nearest point.
+static const vessel_cell *leaf_of(const struct limb_vessels *v, sonde_vec3 p) {
+  const vessel_cell *leaf = v->cell;
+  sonde_vec3 low = v->low;
+  for (double edge = 0.5 * v->edge; leaf->child; edge *= 0.5) {
+    uint32_t k = 0;
+    if (p.x >= low.x + edge) k |= 1, low.x += edge;
+    if (p.y >= low.y + edge) k |= 2, low.y += edge;
+    if (p.z >= low.z + edge) k |= 4, low.z += edge;
+    leaf = &v->cell[leaf->child + k];
+  }
+  return leaf;
+}
+
+bool limb_vessels_clear(const struct limb_vessels *v, const double xyz[3]) {
+  SONDE_ASSERT(v && xyz);
+  sonde_vec3 p = vec3(xyz[0], xyz[1], xyz[2]);
+  if (leaf_of(v, p)->clear < CLEAR_M) return false;
+  for (uint32_t k = 0; k < VESSEL_LYMPH; ++k)
+    if (v_distance(p, v->lymph[k].centre) <
+        most_of(v->lymph[k].length, v->lymph[k].radius) + CLEAR_M)
+      return false;
+  return true;
 }
 
 static nearest find_nearest(const struct limb_vessels *v, sonde_vec3 p) {
@@ -176,16 +203,7 @@ static nearest find_nearest(const struct limb_vessels *v, sonde_vec3 p) {
   } best[KEPT];
   uint32_t count = 0;
   nearest out = {INFINITY, VESSEL_NONE, 0, 0, INFINITY, VESSEL_NONE};
-  // Down to the leaf; a point outside of the cube takes that of its nearest point.
-  const vessel_cell *leaf = v->cell;
-  sonde_vec3 low = v->low;
-  for (double edge = 0.5 * v->edge; leaf->child; edge *= 0.5) {
-    uint32_t k = 0;
-    if (p.x >= low.x + edge) k |= 1, low.x += edge;
-    if (p.y >= low.y + edge) k |= 2, low.y += edge;
-    if (p.z >= low.z + edge) k |= 4, low.z += edge;
-    leaf = &v->cell[leaf->child + k];
-  }
+  const vessel_cell *leaf = leaf_of(v, p);
   for (uint32_t k = 0; k < leaf->count; ++k) {
     const vessel_piece *piece = &v->piece[v->listed[leaf->first + k]];
     double t, d = piece_distance(piece, p, &t);
@@ -214,8 +232,8 @@ static nearest find_nearest(const struct limb_vessels *v, sonde_vec3 p) {
   out.t = best[first].t;
   for (uint32_t i = 0; i < count; ++i)
     if (i != first && best[i].distance < best[first].distance + SLACK_M)
-      out.lumen = fmin(out.lumen, rounded(v, p, best[first].branch, best[first].distance,
-                                          best[i].branch, best[i].distance));
+      out.lumen = least_of(out.lumen, rounded(v, p, best[first].branch, best[first].distance,
+                                              best[i].branch, best[i].distance));
   return out;
 }
 
@@ -256,14 +274,15 @@ limb_vessel_hit limb_vessels_at(const struct limb_vessels *v, const double xyz[3
       const limb_lymph *node = &v->lymph[k];
       sonde_vec3 off = v_sub(p, node->centre);
       double along = v_dot(off, node->axis), a = node->length, b = node->radius;
-      double across = sqrt(fmax(v_norm2(off) - along * along, 0)), h = hypot(along / a, across / b);
+      double across = sqrt(most_of(v_norm2(off) - along * along, 0)),
+             h = hypot(along / a, across / b);
       double slope = hypot(along / (a * a), across / (b * b)),
              d = slope > 0 ? h * (h - 1) / slope : -b;
       if (d <= 0) return (limb_vessel_hit){LIMB_PART_NODE, k, d};
     }
   if (n.lumen <= sheath) return (limb_vessel_hit){LIMB_PART_SHEATH, n.branch, n.lumen};
   hit.index = n.branch;
-  hit.distance_m = fmin(n.lumen, n.nerve);
+  hit.distance_m = least_of(n.lumen, n.nerve);
   return hit;
 }
 
@@ -272,5 +291,5 @@ double limb_vessels_bundle(const struct limb_vessels *v, const double xyz[3]) {
   if (!v) return INFINITY;
   nearest n = find_nearest(v, vec3(xyz[0], xyz[1], xyz[2]));
   if (n.branch == VESSEL_NONE || v->branch[n.branch].kind >= SONDE_LIMB_PERFORATOR) return n.nerve;
-  return fmin(n.lumen - v->place[n.at].wall, n.nerve);
+  return least_of(n.lumen - v->place[n.at].wall, n.nerve);
 }

@@ -69,7 +69,7 @@ static bool list_pairs(neighbours *n) {
 static double wall_gap(const struct limb_vessels *v, uint32_t i, uint32_t j, sonde_vec3 *away) {
   const vessel_place *p = &v->place[i], *a = &v->place[j];
   sonde_vec3 at = node_of(v, i), from = node_of(v, j), along = v_sub(node_of(v, j + 1), from);
-  double t = clamp(v_dot(v_sub(at, from), along) / fmax(v_norm2(along), 1e-18), 0, 1);
+  double t = clamp(v_dot(v_sub(at, from), along) / most_of(v_norm2(along), 1e-18), 0, 1);
   sonde_vec3 off = v_sub(at, v_madd(from, t, along));
   *away = v_unit(off, vec3(1, 0, 0));
   double other = a->radius + t * (a[1].radius - a->radius) + a->wall;
@@ -131,8 +131,9 @@ static band allowed(const struct limb_vessels *v, uint32_t b, uint32_t i, double
   double fat = limb_fat(v->limb, level, angle), deep = limb_deep_fat(v->limb, level, angle);
   if (v->branch[b].layer ==
       LAYER_EYE) // the saphenous fascia bulges over a vein wider than the layer
-    return (band){size + 0.0003, fmax(size + 0.0008, deep - size - 0.0003)};
-  return (band){fmin(deep + size, fat - size - 0.0005), fmax(deep + size, fat - size - 0.0005)};
+    return (band){size + 0.0003, most_of(size + 0.0008, deep - size - 0.0003)};
+  return (band){least_of(deep + size, fat - size - 0.0005),
+                most_of(deep + size, fat - size - 0.0005)};
 }
 
 // Places that join another layer: the arch through the fascia.
@@ -190,7 +191,7 @@ static void push_out(const neighbours *n, sonde_vec3 *step) {
       if (c == 2) grow.z = slope;
     }
     grow.z *= 0.3; // lines go along the bones: mostly sideways
-    step[i] = v_madd(step[i], 0.6 * fmin(lack, 0.004), v_unit(grow, out));
+    step[i] = v_madd(step[i], 0.6 * least_of(lack, 0.004), v_unit(grow, out));
   }
 }
 
@@ -273,7 +274,7 @@ sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_e
     for (uint32_t i = 0; i < v->places; ++i) {
       sonde_vec3 *node = &v->node[v->place[i].node];
       double length = v_norm(step[i]);
-      n.clear[i] -= fmin(length, 0.002);
+      n.clear[i] -= least_of(length, 0.002);
       *node = v_madd(*node, length > 0.002 ? 0.002 / length : 1, step[i]);
     }
   }
