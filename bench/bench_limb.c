@@ -7,19 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Ratio of the muscles' volumes to their rule, for muscles whose largest section is in the thigh or
-// in the calf.
-static void measure_muscles(const sonde_limb *limb, double ratio[2]) {
-  double volume[2] = {0, 0}, rule[2] = {0, 0};
-  for (uint32_t m = 0; m < sonde_limb_muscle_count(); ++m) {
-    sonde_limb_muscle muscle = sonde_limb_muscle_at(limb, m);
-    if (strstr(muscle.name, "gluteus") || strstr(muscle.name, "iliopsoas")) continue;
-    int calf = muscle.largest_level > 1;
-    volume[calf] += muscle.volume_m3, rule[calf] += muscle.rule_m3;
-  }
-  for (int k = 0; k < 2; ++k) ratio[k] = volume[k] / rule[k];
-}
-
 int main(int argc, char **argv) {
   long count = argc > 2 ? atol(argv[2]) : 200, first = argc > 3 ? atol(argv[3]) : 1;
   if (argc < 2 || argc > 4 || count < 1 || count > 100000 || first < 0) {
@@ -70,7 +57,7 @@ int main(int argc, char **argv) {
     while (strcmp(s->name, "common femoral vein") != 0) ++s;
     double off = 1e3 * s->depth_m - limb_vein_depth_mm(body.bmi), own[2];
     error += off / (double)count, square += off * off / (double)count;
-    measure_muscles(limb, own);
+    limb_muscle_ratio(limb, own);
     for (int i = 0; i < 2; ++i) ratio[i] += own[i] / (double)count;
     fprintf(out, ",%.2f,%.3f,%.3f\n", off, own[0], own[1]);
     sonde_limb_destroy(limb);
@@ -82,7 +69,7 @@ int main(int argc, char **argv) {
     printf("V%d: true %.1f %%, depth within 5 mm of its band %.1f %%\n", i + 1,
            100.0 * (double)kept[i] / (double)count, 100.0 * (double)within[i] / (double)count);
   printf("common femoral vein against its rule: mean %.2f mm, RMS %.2f mm\n", error, sqrt(square));
-  printf("muscle volume against its rule: thigh %.3f, calf %.3f\n", ratio[0], ratio[1]);
+  printf("volume of labelled muscle against its rule: thigh %.3f, calf %.3f\n", ratio[0], ratio[1]);
   if (full) fprintf(stderr, "bench_limb: %s could not be written\n", argv[1]);
   return full || sum[0] + sum[1] + sum[3] + sum[4] > 0;
 }

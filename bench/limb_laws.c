@@ -5,6 +5,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 
+#include <math.h>
 #include <string.h>
 
 static const double PIXEL_M = 0.0006;
@@ -257,6 +258,34 @@ static const struct {
                        {"gastrocnemius veins", muscle_veins, -8, 8, 0, {{15, 35}, {15, 43}}}};
 
 double limb_vein_depth_mm(double bmi) { return 19 + 1.2 * (bmi - 22.5); }
+
+void limb_muscle_ratio(const sonde_limb *limb, double ratio[2]) {
+  enum { SLICES = 120, AROUND = 48, RINGS = 16, MUSCLES = 64 };
+  const sonde_limb_body *body = sonde_limb_body_of(limb);
+  double count[MUSCLES] = {0}, volume[2] = {0}, rule[2] = {0};
+  SONDE_ASSERT(sonde_limb_muscle_count() <= MUSCLES);
+  // Cells of equal area of the fascia's section in slices from the upper end to the ankle.
+  for (int slice = 0; slice < SLICES; ++slice)
+    for (int a = 0; a < AROUND; ++a) {
+      double level = -0.2 + 2.2 * (slice + 0.5) / SLICES, angle = 2 * SONDE_PI * (a + 0.5) / AROUND;
+      double thick = 2.2 / SLICES * (level < 1 ? body->thigh_length_m : body->calf_length_m);
+      double radius = v_distance(sonde_limb_point(limb, level, angle, 1),
+                                 sonde_limb_point(limb, level, angle, 0));
+      double cell = thick * SONDE_PI * radius * radius / (AROUND * RINGS);
+      for (int ring = 0; ring < RINGS; ++ring) {
+        sonde_vec3 at = sonde_limb_point(limb, level, angle, sqrt((ring + 0.5) / RINGS));
+        sonde_limb_label label = sonde_limb_at(limb, at);
+        if (label.tissue == SONDE_LIMB_MUSCLE) count[label.index] += cell;
+      }
+    }
+  for (uint32_t m = 0; m < sonde_limb_muscle_count(); ++m) {
+    sonde_limb_muscle muscle = sonde_limb_muscle_at(limb, m);
+    if (strstr(muscle.name, "gluteus") || strstr(muscle.name, "iliopsoas")) continue;
+    int calf = muscle.largest_level > 1;
+    volume[calf] += count[m], rule[calf] += muscle.rule_m3;
+  }
+  for (int k = 0; k < 2; ++k) ratio[k] = volume[k] / rule[k];
+}
 
 void limb_views(const sonde_limb *limb, limb_view view[LIMB_VIEWS]) {
   static const double TILTS[] = {0, -15, 15};

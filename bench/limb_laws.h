@@ -19,6 +19,11 @@ typedef struct limb_view {
 // tilts up to 15 degrees until all conditions hold in one plane.
 void limb_views(const sonde_limb *limb, limb_view view[LIMB_VIEWS]);
 
+// Volume of what is labelled as muscle against the muscles' rule, for those whose largest section
+// is in the thigh or in the calf; without gluteus and iliopsoas, which end outside of the limb.
+// Fascia, septa and the loose tissue between muscles have labels of their own and do not count.
+void limb_muscle_ratio(const sonde_limb *limb, double ratio[2]);
+
 // Depth of the front wall of the common femoral vein below the skin by body mass, mm.
 double limb_vein_depth_mm(double bmi);
 
