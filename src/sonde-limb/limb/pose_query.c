@@ -94,10 +94,12 @@ sonde_limb_label sonde_limb_pose_at(const sonde_limb_pose *pose, sonde_vec3 pose
   const double gap = 0.005; // where a joint closes on tissue, that which is nearest
   if (limb_pose_inverse(pose, limb_side_point(limb, posed_m), &rest) > gap)
     return (sonde_limb_label){SONDE_LIMB_OUTSIDE, 0, limb->body.side};
+  const double right[3] = {rest.x, rest.y, rest.z};
   rest = limb_side_point(limb, rest);
   sonde_limb_label label = sonde_limb_at(limb, rest);
   if (!limb->vessels || label.tissue <= SONDE_LIMB_SKIN || label.tissue == SONDE_LIMB_BONE ||
-      label.tissue == SONDE_LIMB_NERVE || label.tissue == SONDE_LIMB_NODE)
+      label.tissue == SONDE_LIMB_NERVE || label.tissue == SONDE_LIMB_NODE ||
+      limb_vessels_clear(limb->vessels, right))
     return label;
   sonde_limb_vessel_near near = sonde_limb_vessel_at(limb, rest);
   const vessel_branch *branch = &limb->vessels->branch[near.vessel];
