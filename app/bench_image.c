@@ -34,8 +34,12 @@ typedef struct bench {
   double scatterers;
 } bench;
 
-static const options DEFAULTS = {
-    .lines = 192, .samples = 1024, .scatterers = 1000000, .frames = 200, .size = {512, 512}};
+static const options DEFAULTS = {.lines = 192,
+                                 .samples = 1024,
+                                 .scatterers = 1000000,
+                                 .frames = 200,
+                                 .size = {512, 512},
+                                 .scanner = "plain"};
 
 static const app_option TABLE[] = {
     OPT_MODEL(model),

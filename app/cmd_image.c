@@ -23,6 +23,7 @@ typedef struct options {
 static void prepare(void *to) {
   *(options *)to = (options){.probe = "linear",
                              .pathology = "healthy",
+                             .scanner = "venous",
                              .size = {512, 512},
                              .numbers = {NAN},
                              .force_n = NAN,
@@ -78,7 +79,7 @@ static const app_option TABLE[] = {
     OPT_TEXT(
         scanner, "scanner", "NAME|FILE",
         "a scanner that ships (sonde scanner list) or a file; its settings are the defaults of "
-        "those below")};
+        "those below; default venous")};
 
 static const struct {
   const char *key, *name, *value, *help;

@@ -9,7 +9,8 @@
 sonde_status scanner_choose(const char *name, sonde_scanner *scanner, sonde_error *error) {
   char directory[4096], path[5120];
   assert(scanner != NULL);
-  if (!name || strcmp(name, "plain") == 0) {
+  assert(name != NULL);
+  if (strcmp(name, "plain") == 0) {
     *scanner = sonde_scanner_plain();
     return SONDE_OK;
   }

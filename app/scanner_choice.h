@@ -4,7 +4,7 @@
 
 #include "app.h"
 
-// The scanner "plain", a scanner that ships, or a file; NULL: the default one.
+// The scanner "plain", a scanner that ships, or a file.
 sonde_status scanner_choose(const char *name, sonde_scanner *scanner, sonde_error *error);
 
 #endif

@@ -69,7 +69,6 @@ static sonde_status judge(const scanner_fit *fit, bench *b, const sonde_scanner 
             (sonde_quat){h * (q.w - q.z), h * (q.x + q.y), h * (q.y - q.x), h * (q.z + q.w)};
       }
       const double aperture = scanner->aperture_m > 0 ? scanner->aperture_m : 2 * s->probe.half_x_m;
-      b->image.height = (uint32_t)fmin(WIDE, WIDE * scanner->settings.depth_m / aperture);
       sonde_echo_render(echo, pose, aperture, &b->pathology, &scanner->settings, &b->image);
       texture_add(b->table, &b->image, 24);
     }

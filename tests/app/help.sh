@@ -20,6 +20,7 @@ declare -A options=(
   [bench]="--scene --haptics --device --json"
   [validate]="--quick --pressing --sites --json"
   [exam]="--case --protocol --operator --seed --compare -o --json"
+  [scanner]="--model --evaluations --from -o --json"
   [cases]="--check --generate --level -o --json"
   [devices]="--probe --json"
   [paper]="-o --output --quick --json"

@@ -78,7 +78,7 @@ sonde_status sonde_scanner_save(const sonde_scanner *scanner, const char *title,
     sonde_file_printf(file, *c == '"' || *c == '\\' ? "\\%c" : "%c", *c == '\n' ? ' ' : *c);
   sonde_file_printf(file, "\"\n");
   for (uint32_t k = 0; k < count; ++k)
-    sonde_file_printf(file, "%s: %.6g\n", numbers[k].key,
+    sonde_file_printf(file, "%s: %.7g\n", numbers[k].key,
                       *number_at(&copy, &numbers[k]) / numbers[k].si);
   sonde_file_printf(file, "sliders_db: [");
   for (int k = 0; k < SONDE_SCANNER_SLIDERS; ++k)
