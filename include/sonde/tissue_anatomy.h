@@ -105,10 +105,16 @@ typedef struct sonde_map_seed {
   uint32_t section;     /**< compartment; a septum parts two of them */
   bool muscle;          /**< false: fat between muscles */
   sonde_vec3 fibre;     /**< unit, along the belly's fibres */
-  sonde_vec3 grain;     /**< the same where the muscle is thickest, one direction for a cell */
-  sonde_vec3 out;       /**< unit, from the limb's axis to that place */
   double pennation_rad; /**< between fibres and belly */
+  double lean;          /**< of the fibres: way outward per way along z, from the belly's axis */
 } sonde_map_seed;
+
+/** A nerve, tendon or lymph node. */
+typedef struct sonde_map_body {
+  sonde_tissue tissue;
+  sonde_vec3 axis;   /**< unit, along it */
+  sonde_vec3 half_m; /**< semi-axes across, the wide and the thick one, and along it; 0: a cord */
+} sonde_map_body;
 
 /**
  * What knows the tissue of a model at every rest point, from a description finer than its layers.
@@ -127,6 +133,15 @@ typedef struct sonde_tissue_map {
   /** |p - seed|^2 - weight of seeds at a rest point, m^2, and where the seeds are there. */
   void (*powers)(const void *self, sonde_vec3 rest_m, uint32_t count, const uint32_t *seed,
                  double *power_m2, sonde_vec3 *at_m);
+  /** Nerves, tendons and nodes that come within a distance of a point, at most `room`; their
+   * number.
+   */
+  uint32_t (*bodies)(const void *self, sonde_vec3 rest_m, double within_m, uint32_t room,
+                     uint32_t *body);
+  /** Facts of a body where it comes nearest to a point. */
+  sonde_map_body (*body)(const void *self, uint32_t body, sonde_vec3 rest_m);
+  /** Place of a point in a body over its semi-axes; along a cord in m. Far beyond its end. */
+  sonde_vec3 (*body_place)(const void *self, uint32_t body, sonde_vec3 rest_m);
   void (*destroy)(struct sonde_tissue_map *map);
 } sonde_tissue_map;
 

@@ -3,6 +3,7 @@
 
 #include "limb/label.h"
 #include "limb/muscles.h"
+#include "limb/vessels.h"
 #include "sonde/limb_model.h"
 
 // A point of the model's frame in that of a right limb.
@@ -97,25 +98,16 @@ static sonde_map_seed seed_facts(const void *self, uint32_t seed, sonde_vec3 res
   sonde_map_seed facts = {.cell = cell.cell,
                           .section = (uint32_t)limb_cell_compartment(cell.cell),
                           .muscle = cell.cell < SONDE_LIMB_MUSCLES,
-                          .fibre = vec3(0, 0, 1),
-                          .grain = vec3(0, 0, 1),
-                          .out = vec3(1, 0, 0)};
+                          .fibre = vec3(0, 0, 1)};
   if (!facts.muscle) return facts;
-  // The first seed of the cell in the row in which the muscle is thickest.
-  limb_cell thick = {.cell = cell.cell, .seed = seed};
-  while (thick.seed > 0 && m->cell_of[thick.seed - 1] == cell.cell) --thick.seed;
-  for (uint32_t row = 0; row + 1 < LIMB_CELL_ROWS; ++row)
-    if (m->area[row][cell.cell] > m->area[thick.row][cell.cell]) thick.row = row;
-  const limb_seed *at = &m->seed[thick.row][thick.seed];
-  const double level = LIMB_TOP + thick.row * LIMB_CELL_STEP;
-  const sonde_vec3 c = limb_centre(limb, level),
-                   beside = v_scale(vec3((double)at->x, (double)at->y, 0), m->radius[thick.row]);
-  sonde_vec3 grain = limb_fibre(limb, &thick, v_add(vec3(c.x, c.y, limb_z(limb, level)), beside));
-  facts.grain = limb_side_point(limb, vec3(grain.x, grain.y, -grain.z));
-  facts.out = limb_side_point(limb, v_unit(beside, vec3(1, 0, 0)));
   sonde_vec3 fibre = limb_fibre(limb, &cell, in_limb(limb, rest));
   facts.fibre = limb_side_point(limb, vec3(fibre.x, fibre.y, -fibre.z));
-  facts.pennation_rad = limb_muscle_table[cell.cell].pennation_deg * SONDE_PI / 180;
+  // Limbs run down where the model's z goes up: outward-going fibres go outward along z.
+  static const double TOWARDS[] = {
+      [LIMB_STRAP] = 0, [LIMB_OUTWARD] = 1, [LIMB_INWARD] = -1, [LIMB_CENTRAL] = 0.5};
+  const limb_muscle *muscle = &limb_muscle_table[cell.cell];
+  facts.pennation_rad = muscle->pennation_deg * SONDE_PI / 180;
+  facts.lean = TOWARDS[muscle->pennate] * tan(facts.pennation_rad);
   return facts;
 }
 
@@ -128,6 +120,79 @@ static void powers(const void *self, sonde_vec3 rest, uint32_t count, const uint
     power[k] = power_at(limb->muscles, &r, seed[k], &x, &y);
     if (at) at[k] = v_add(rest, limb_side_point(limb, vec3(x - r.x, y - r.y, 0)));
   }
+}
+
+static const double FAR_AWAY = 50; // in semi-axes
+
+static sonde_vec3 in_model(const sonde_limb *limb, sonde_vec3 direction) {
+  return limb_side_point(limb, vec3(direction.x, direction.y, -direction.z));
+}
+
+// A nerve, node or tendon, in this order, in the right limb's frame where it comes nearest to p.
+static limb_body nearest(const sonde_limb *limb, uint32_t which, sonde_vec3 p) {
+  const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
+  if (which < nerves) return limb_nerve_body(limb->vessels, which, p);
+  limb_body body = {.ends = true};
+  const double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2), step = 0.01;
+  sonde_vec3 next;
+  double wide, thick;
+  if (!limb_tendon_body(limb, which - nerves, level, &body.centre, &body.wide, &body.thick))
+    return body;
+  if (limb_tendon_body(limb, which - nerves, level + step, &next, &wide, &thick))
+    body.axis = v_unit(v_sub(next, body.centre), vec3(0, 0, -1));
+  else if (limb_tendon_body(limb, which - nerves, level - step, &next, &wide, &thick))
+    body.axis = v_unit(v_sub(body.centre, next), vec3(0, 0, -1));
+  body.ends = false;
+  return body;
+}
+
+static uint32_t bodies(const void *self, sonde_vec3 rest, double within_m, uint32_t room,
+                       uint32_t *found) {
+  const sonde_limb *limb = self;
+  const sonde_vec3 p = in_limb(limb, rest);
+  const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
+  uint32_t count = 0;
+  SONDE_ASSERT(room > 0 && found != NULL);
+  // Cords run along the limb: where the point's height crosses them, or a bit above and below.
+  for (uint32_t k = 0; k < nerves + limb_tendon_count() && count < room; ++k)
+    for (int shift = -1; shift <= 1; ++shift) {
+      const limb_body body = nearest(limb, k, vec3(p.x, p.y, p.z + 0.5 * shift * within_m));
+      const double away = v_distance(body.centre, p) - fmax(body.wide, body.length);
+      if (body.ends || away > within_m) continue;
+      found[count++] = k;
+      break;
+    }
+  return count;
+}
+
+static sonde_map_body body(const void *self, uint32_t which, sonde_vec3 rest) {
+  const sonde_limb *limb = self;
+  const limb_body b = nearest(limb, which, in_limb(limb, rest));
+  const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
+  return (sonde_map_body){.tissue = b.node           ? SONDE_TISSUE_NODE
+                                    : which < nerves ? SONDE_TISSUE_NERVE
+                                                     : SONDE_TISSUE_TENDON,
+                          .axis = in_model(limb, b.axis),
+                          .half_m = {b.wide, b.thick, b.length}};
+}
+
+static sonde_vec3 body_place(const void *self, uint32_t which, sonde_vec3 rest) {
+  const sonde_limb *limb = self;
+  const sonde_vec3 p = in_limb(limb, rest), outside = vec3(FAR_AWAY, FAR_AWAY, 0);
+  const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
+  if (which >= nerves) {
+    const double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2);
+    const sonde_vec3 c = limb_centre(limb, level);
+    double at[2];
+    if (!limb_tendon_place(limb, which - nerves, level, p.x - c.x, p.y - c.y, at)) return outside;
+    return vec3(at[0], at[1], p.z);
+  }
+  const limb_body b = limb_nerve_body(limb->vessels, which, p);
+  if (b.ends) return outside;
+  const sonde_vec3 d = v_sub(p, b.centre);
+  const double along = v_dot(d, b.axis);
+  return vec3(v_dot(d, b.side) / b.wide, v_dot(d, v_cross(b.axis, b.side)) / b.thick,
+              b.length > 0 ? along / b.length : p.z);
 }
 
 static void destroy(sonde_tissue_map *map) {
@@ -147,6 +212,9 @@ sonde_status limb_map_create(sonde_limb *limb, sonde_tissue_map **map, sonde_err
                              .seeds = seeds,
                              .seed = seed_facts,
                              .powers = powers,
+                             .bodies = bodies,
+                             .body = body,
+                             .body_place = body_place,
                              .destroy = destroy};
   return SONDE_OK;
 }

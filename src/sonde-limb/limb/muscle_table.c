@@ -551,28 +551,52 @@ const char *limb_tendon_name(int tendon) {
   return TENDONS[tendon].name;
 }
 
+// Where a tendon is at a level: its middle by angle and radius about the limb's centre, m, and its
+// semi-axes; false where it is not.
+static bool tendon_at_level(const sonde_limb *limb, uint32_t which, double level, double *angle,
+                            double *radius, double *wide, double *thick) {
+  const double size = limb->body.stature_m / 1.75;
+  const limb_tendon *t = &TENDONS[which];
+  SONDE_ASSERT(t->knots >= 2);
+  if (level < t->knot[0][0] || level > t->knot[t->knots - 1][0]) return false;
+  uint32_t i = 0;
+  while (i + 2 < t->knots && t->knot[i + 1][0] < level) ++i;
+  const double *a = t->knot[i], *b = t->knot[i + 1];
+  const double u = (level - a[0]) / (b[0] - a[0]), turn = remainder(b[1] - a[1], 360);
+  *angle = (a[1] + u * turn) * SONDE_PI / 180;
+  *radius = (a[2] + u * (b[2] - a[2])) * limb_fascia_radius(limb, level, *angle);
+  *wide = (a[3] + u * (b[3] - a[3])) * size * 1e-3;
+  *thick = (a[4] + u * (b[4] - a[4])) * size * 1e-3;
+  return true;
+}
+
+bool limb_tendon_place(const sonde_limb *limb, uint32_t which, double level, double x, double y,
+                       double place[2]) {
+  double angle, r, wide, thick;
+  SONDE_ASSERT(which < SONDE_COUNT_OF(TENDONS));
+  if (!tendon_at_level(limb, which, level, &angle, &r, &wide, &thick)) return false;
+  // Along the fascia and outward from the strip's middle, which follows the fascia's curve.
+  const double here = atan2(x, y), from = hypot(x, y);
+  const double bend = r / limb_fascia_radius(limb, level, angle);
+  place[0] = from * remainder(here - angle, 2 * SONDE_PI) / wide;
+  place[1] = (from - bend * limb_fascia_radius(limb, level, here)) / thick;
+  return true;
+}
+
+bool limb_tendon_body(const sonde_limb *limb, uint32_t which, double level, sonde_vec3 *middle,
+                      double *wide, double *thick) {
+  double angle, r;
+  SONDE_ASSERT(which < SONDE_COUNT_OF(TENDONS));
+  if (!tendon_at_level(limb, which, level, &angle, &r, wide, thick)) return false;
+  const sonde_vec3 c = limb_centre(limb, level);
+  *middle = vec3(c.x + r * sin(angle), c.y + r * cos(angle), limb_z(limb, level));
+  return true;
+}
+
 int limb_tendon_at(const sonde_limb *limb, double level, double x, double y) {
-  double size = limb->body.stature_m / 1.75;
-  for (size_t k = 0; k < SONDE_COUNT_OF(TENDONS); ++k) {
-    const limb_tendon *t = &TENDONS[k];
-    SONDE_ASSERT(t->knots >= 2);
-    if (level < t->knot[0][0] || level > t->knot[t->knots - 1][0]) continue;
-    uint32_t i = 0;
-    while (i + 2 < t->knots && t->knot[i + 1][0] < level) ++i;
-    const double *a = t->knot[i], *b = t->knot[i + 1];
-    double u = (level - a[0]) / (b[0] - a[0]);
-    double turn = remainder(b[1] - a[1], 360);
-    double angle = (a[1] + u * turn) * SONDE_PI / 180;
-    double r = (a[2] + u * (b[2] - a[2])) * limb_fascia_radius(limb, level, angle);
-    double wide = (a[3] + u * (b[3] - a[3])) * size * 1e-3;
-    double thick = (a[4] + u * (b[4] - a[4])) * size * 1e-3;
-    // Along the fascia and outward from the strip's middle, which follows the fascia's curve.
-    double here = atan2(x, y), from = hypot(x, y);
-    double outward =
-        from - r / limb_fascia_radius(limb, level, angle) * limb_fascia_radius(limb, level, here);
-    double along = from * remainder(here - angle, 2 * SONDE_PI);
-    double p = along / wide, q = outward / thick;
-    if (p * p + q * q < 1) return (int)k;
+  for (uint32_t k = 0; k < SONDE_COUNT_OF(TENDONS); ++k) {
+    double p[2];
+    if (limb_tendon_place(limb, k, level, x, y, p) && p[0] * p[0] + p[1] * p[1] < 1) return (int)k;
   }
   return -1;
 }

@@ -101,6 +101,12 @@ limb_compartment limb_cell_compartment(uint32_t cell);
 
 // Tendons: flat or round strips, along the fascia.
 int limb_tendon_at(const sonde_limb *limb, double level, double x, double y);
+// Place in a tendon at a level over its semi-axes, along the fascia and outward, and the tendon's
+// middle and semi-axes there, m; false beyond its ends.
+bool limb_tendon_place(const sonde_limb *limb, uint32_t which, double level, double x, double y,
+                       double place[2]);
+bool limb_tendon_body(const sonde_limb *limb, uint32_t which, double level, sonde_vec3 *middle,
+                      double *wide, double *thick);
 const char *limb_tendon_name(int tendon);
 uint32_t limb_tendon_count(void);
 

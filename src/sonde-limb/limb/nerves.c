@@ -1,4 +1,5 @@
 // Nerves and lymph nodes of the groin (docs/limb_vessels.md).
+#include "limb/vessels.h"
 #include "limb/vessels_graph.h"
 
 typedef struct nerve_row {
@@ -172,4 +173,44 @@ void limb_lymph_lay(struct limb_vessels *v) {
       node->centre = v_madd(node->centre, -lack + 1e-4, v_unit(away, vec3(1, 0, 0)));
     }
   }
+}
+
+uint32_t limb_nerve_bodies(const struct limb_vessels *v) {
+  SONDE_ASSERT(v != NULL);
+  return LIMB_NERVES + VESSEL_LYMPH;
+}
+
+limb_body limb_nerve_body(const struct limb_vessels *v, uint32_t which, sonde_vec3 p) {
+  SONDE_ASSERT(which < LIMB_NERVES + VESSEL_LYMPH);
+  if (which >= LIMB_NERVES) {
+    const limb_lymph *node = &v->lymph[which - LIMB_NERVES];
+    const sonde_vec3 side = v_unit(v_cross(node->axis, vec3(0, 1, 0)), vec3(1, 0, 0));
+    return (limb_body){.centre = node->centre,
+                       .axis = node->axis,
+                       .side = side,
+                       .wide = node->radius,
+                       .thick = node->radius,
+                       .length = node->length,
+                       .node = true};
+  }
+  // Nerves run downwards: the piece at the point's height.
+  const limb_nerve *nerve = &v->nerve[which];
+  limb_body body = {.wide = nerve->half + nerve->radius, .thick = nerve->radius, .ends = true};
+  if (nerve->count < 2) return body;
+  uint32_t low = 0, high = nerve->count - 1;
+  while (high - low > 1) {
+    const uint32_t middle = (low + high) / 2;
+    if (nerve->point[middle].z > p.z)
+      low = middle;
+    else
+      high = middle;
+  }
+  const sonde_vec3 a = nerve->point[low], b = nerve->point[high];
+  const double fall = a.z - b.z, t = fall > 1e-6 ? (a.z - p.z) / fall : 0;
+  body.ends = t < 0 || t > 1;
+  body.centre = v_lerp(a, b, clamp(t, 0, 1));
+  body.axis = v_unit(v_sub(b, a), vec3(0, 0, -1));
+  const sonde_vec3 side = v_lerp(nerve->side[low], nerve->side[high], clamp(t, 0, 1));
+  body.side = v_unit(v_madd(side, -v_dot(side, body.axis), body.axis), vec3(1, 0, 0));
+  return body;
 }

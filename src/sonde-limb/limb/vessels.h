@@ -34,4 +34,16 @@ const char *limb_vessels_name(const struct limb_vessels *vessels, limb_part part
 // give way to; perforators and the veins inside soleus and gastrocnemius do not count.
 double limb_vessels_bundle(const struct limb_vessels *vessels, const double xyz[3]);
 
+// A nerve, node or tendon where it comes nearest to a point.
+typedef struct limb_body {
+  sonde_vec3 centre, axis, side; // side: along the wide semi-axis; units
+  double wide, thick, length;    // semi-axes, m; length 0: a cord
+  bool ends;                     // the point lies beyond an end
+  bool node;
+} limb_body;
+
+// Nerves, then nodes: which < limb_nerve_bodies().
+uint32_t limb_nerve_bodies(const struct limb_vessels *vessels);
+limb_body limb_nerve_body(const struct limb_vessels *vessels, uint32_t which, sonde_vec3 p);
+
 #endif

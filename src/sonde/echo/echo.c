@@ -77,6 +77,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->row, lines * MOST_FIELDS);
   CARVE(echo->level[0], lines * MOST_LEVELS);
   CARVE(echo->level[1], lines * MOST_LEVELS);
+  for (int k = 0; k < 3; ++k) CARVE(echo->septum[k], lines);
   CARVE(echo->knots, lines * TEXTURES * KNOT_FLOATS);
   CARVE(echo->scatter, lines);
   CARVE(echo->loss, lines);

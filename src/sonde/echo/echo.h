@@ -117,6 +117,8 @@ struct sonde_echo {
   uint32_t lesion_count;
   uint32_t cell[MOST_CELLS]; // seeds in view, of a model with a tissue map
   uint32_t cell_count;
+  uint32_t body[MOST_BODIES]; // nerves, tendons and nodes in view, of such a model
+  uint32_t body_count;
   uint32_t fields, levels;     // of the plane and of the medium
   plane_node *node;            // [PLANE_NODES]
   float *plane;                // [MOST_FIELDS][PLANE_NODES] and a vector
@@ -127,8 +129,9 @@ struct sonde_echo {
   float line_share[SONDE_MOST_LINES];    // distance to the next, columns
   float *wide;                           // [2][fields][padded] two coarse rows, per line
   float *row;                            // [fields][padded], one row of the march
-  float wall_m[MOST_VESSELS];            // of those shown
-  float *level[2];                       // [levels][padded] of this row and the last
+  float *septum[3]; // [padded] distance to the fat's septa of this row and the last, their strength
+  float wall_m[MOST_VESSELS];    // of those shown
+  float *level[2];               // [levels][padded] of this row and the last
   float *knots;                  // [padded][TEXTURES][KNOT_FLOATS] of the textures, kernel.h
   float *scatter, *loss, *rough; // [padded] of this row
   float *loss_db;                // [padded] accumulated

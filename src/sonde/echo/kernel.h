@@ -15,7 +15,7 @@ enum {
   // Skin, dermis, deep fascia, cortex, superficial fascia; the vessels' walls and the lesions
   // follow.
   LAYER_LEVELS = 5,
-  TEXTURES = 14,    // one more than the last texture's salt
+  TEXTURES = 15,    // one more than the last texture's salt
   KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
   RING_PLANES = 2 * SONDE_RANK,
@@ -150,13 +150,22 @@ typedef struct tissue_cell {
   float section;    // number of the compartment: a septum parts two
 } tissue_cell;
 
+typedef enum tissue_body_kind { TISSUE_NERVE, TISSUE_TENDON, TISSUE_LYMPH } tissue_body_kind;
+
+// A nerve, tendon or lymph node of a tissue map.
+typedef struct tissue_body {
+  tissue_body_kind kind;
+  float half_m[3]; // semi-axes; along a cord 1
+  float facing;    // how squarely the beam meets its fibres, 0..1
+} tissue_body;
+
 // Facts of the cells that points look up by the cell's place, a row each.
 typedef enum cell_fact {
   CELL_MUSCLE, // 1, or 0: fat
   CELL_GAIN,   // of the backscatter
-  CELL_FACING, // how squarely the beam meets the sheets between bundles, 0..1
-  CELL_VOXEL,  // voxel of the muscle's tile = [3] constant + [9] coefficients of across, up, s
-  CELL_FACTS = CELL_VOXEL + 12
+  CELL_LEAN,   // of the fibres: depth lost per length along the leg
+  CELL_SHIFT,  // [3] of muscle's tile, voxels
+  CELL_FACTS = CELL_SHIFT + 3
 } cell_fact;
 
 // A row of the coarse plane, per line.
@@ -178,11 +187,14 @@ typedef struct tissue_job {
   uint32_t cells; // 0: the layers alone
   tissue_cell cell[MOST_CELLS];
   float fact[CELL_FACTS][MOST_CELLS];
+  uint32_t bodies;
+  tissue_body body[MOST_BODIES];
   const uint32_t *tile[SONDE_TILES]; // [SIDE][SIDE][SIDE], kernel_texture.h
   float beam_x, beam_y;              // direction of the beam in the section
   float bone_radius_m;               // of the cylinder about the leg's axis
   float webs, oedema;                // 0..1
   float rough_bone, rough_m; // amplitude over muscle on a level cortex, fading over so far from it
+  float periosteum;          // the same of the soft tissue on the cortex
   float rows_per_m;          // of the march, 0 in its first row
   bool plain;
   float *memory; // [lines][TEXTURES][KNOT_FLOATS], of one set of kernels; all bits set: empty
@@ -190,7 +202,10 @@ typedef struct tissue_job {
   float *rough;          // what the cortex's facets scatter besides
   float *level;          // [levels][lines] signed: sign changes are interfaces
   const float *before;   // the same of the row above
-  uint8_t *crossed;      // [lines / ECHO_ALIGN] whether any sign of these lines changed
+  // [lines] signed distance to the nearest of the fat's coherent septa, which jumps half-way
+  // between two, and their strength there
+  float *septum, *septum_size;
+  uint8_t *crossed; // [lines / ECHO_ALIGN] whether any sign of these lines changed
 } tissue_job;
 
 // Gain of a row of the march: what scatters there and is left behind the losses, and clutter.

@@ -51,14 +51,14 @@ INLINE muscle_place place_in_muscles(const tissue_job *job, knots *memory, const
   }
   floats dx = x - next_x, dy = y - next_y, apart = vsqrt(dx * dx + dy * dy) + 1e-3f;
   floats away = (next - least) * 0.5e-3f / apart; // m
-  ints septum = section != next_section;
+  ints parted = section != next_section;
   floats patch = texture(memory, theta, s * 160, depth * 400, 2 * TURNS_FAT, 5);
-  floats half = vselect(septum, vset(septum_m), vset(epimysium_m)) * (1 + 0.5f * patch);
+  floats half = vselect(parted, vset(septum_m), vset(epimysium_m)) * (1 + 0.5f * patch);
   floats height = vmax(1 - away / half, vset(0));
   floats square = (dx * job->beam_x + dy * job->beam_y) / apart;
   floats facing = grazing + (1 - grazing) * square * square;
   at.bright = height * facing * (0.75f + 0.7f * patch) *
-              vselect(septum, vset(septum_scatter), vset(epimysium_scatter));
+              vselect(parted, vset(septum_scatter), vset(epimysium_scatter));
   return at;
 }
 
@@ -67,18 +67,16 @@ INLINE floats cell_fact_at(const tissue_job *job, cell_fact which, ints cell, bo
   return one ? vset(job->fact[which][cell[0]]) : vgather(job->fact[which], cell);
 }
 
-// Muscle's tile along the fibres of each lane's cell.
-INLINE tile_grain muscle_grain(const tissue_job *job, ints cell, bool one, floats across, floats up,
-                               floats s) {
-  floats voxel[3];
-  for (int c = 0; c < 3; ++c) {
-    const cell_fact of = (cell_fact)(CELL_VOXEL + 3 + 3 * c);
-    voxel[c] = cell_fact_at(job, (cell_fact)(CELL_VOXEL + c), cell, one) +
-               cell_fact_at(job, of, cell, one) * across +
-               cell_fact_at(job, (cell_fact)(of + 1), cell, one) * up +
-               cell_fact_at(job, (cell_fact)(of + 2), cell, one) * s;
-  }
-  return tile_at(job->tile[1], voxel[0], voxel[1], voxel[2]);
+// Muscle's tile along the fibres of each lane's cell: 26 tiles around the leg, of 51 mm along it
+// and 16 mm down.
+INLINE tile_grain muscle_grain(const tissue_job *job, ints cell, bool one, floats theta, floats s,
+                               floats depth) {
+  const float around = 26 * SONDE_TILE_SIDE * 0.159154943f;
+  floats lean = cell_fact_at(job, CELL_LEAN, cell, one);
+  floats x = theta * around + cell_fact_at(job, CELL_SHIFT, cell, one);
+  floats y = s * 1250 + cell_fact_at(job, (cell_fact)(CELL_SHIFT + 1), cell, one);
+  floats z = (depth + lean * s) * 4000 + cell_fact_at(job, (cell_fact)(CELL_SHIFT + 2), cell, one);
+  return tile_at(job->tile[1], x, y, z);
 }
 
 #endif

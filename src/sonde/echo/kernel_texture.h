@@ -124,6 +124,21 @@ INLINE tile_grain fat_grain(const uint32_t *tile, floats theta, floats s, floats
   return tile_at(tile, theta * around, s * 2000, depth * 4000);
 }
 
+// The nearest of the septa between large lobules: signed distance along the depth, m, and strength.
+typedef struct septum {
+  floats away, size;
+} septum;
+
+// Sheets every 2.2 mm along the skin, bent over 4 to 6 mm; each has patches of its own.
+INLINE septum septum_at(knots *memory, floats theta, floats s, floats depth) {
+  const float per_m = 450;
+  floats bend = texture(memory, theta, s * 160, depth * 300, 2 * TURNS_FAT, 14);
+  floats w = depth * per_m + 0.6f * bend, nearest = vfloor(w + 0.5f);
+  floats patch = texture(memory, theta, s * 170, nearest + 0.5f, 2 * TURNS_FAT, 0);
+  return (septum){(w - nearest) * (1 / per_m),
+                  vmin(vmax(0.35f + 1.3f * patch, vset(0)), vset(1.2f))};
+}
+
 // Oedema: fluid in clefts around lobules of 6 by 8 mm, 0..1.
 INLINE floats clefts(knots *memory, floats theta, floats s, floats depth, float oedema) {
   floats bend = texture(memory, theta, s * 70, depth * 250, TURNS_FAT, 1);

@@ -11,7 +11,7 @@
 static const float air_gap_m = 2e-3f;
 // Clutter: late echoes, which went back and forth between the layers above, and side lobes. Its
 // power over that of the tissue above, and the depth over which it fades.
-static const float clutter_power = 0.02f, clutter_m = 5e-3f;
+static const float clutter_power = 0.015f, clutter_m = 5e-3f;
 
 // Echo of an interface at normal incidence over the rms of muscle speckle, and what the passage
 // costs beyond, dB. At other angles the beam decides what comes back.
@@ -22,13 +22,15 @@ enum { FASCIA = 2, CORTEX = 3, SUPERFICIAL = 4 };
 static const interface interfaces[LAYER_LEVELS] = {
     {18, 0},  // skin
     {10, 0},  // dermis and fat
-    {21, 0},  // fascia
+    {21, 0},  // deep fascia
     {36, 55}, // cortex
     {14, 0},  // superficial fascia
 };
 static const interface vessel_wall[2] = {{14, 0}, {17, 0}}; // vein, artery
 // Of the deeper sheets of a fascia and of the outer face of an artery's wall, over the first one.
 static const float next_sheet_db = -3;
+// Unevenness of interfaces along themselves.
+static const float rough_per_m = 750, patch_per_m = 250, spread_per_m = 180, patch_db = 8;
 static const interface lesion_edges[SONDE_LESION_KINDS] = {
     {9, 0},  // capsule of a node
     {15, 0}, // cyst
@@ -37,6 +39,10 @@ static const interface lesion_edges[SONDE_LESION_KINDS] = {
 // Scatterers of the cortex's facets: their echo where it is level over the smooth cortex's, and how
 // thick they lie on it.
 static const float rough_share = 0.3f, rough_m = 0.4e-3f;
+static const float septum_db = 15;    // of the fat's septa
+static const float case_db = 10;      // of a clot's level, either way
+static const float thigh_lean = 0.1f; // of fibres where no map tells it
+static const float periosteum_db = 10;
 static const float wall_m[2] = {0.6e-3f, 0.9e-3f}, thin_wall = 0.25f; // of a branch's radius
 
 // Fat around a vessel between muscles, of its radius and at most.
@@ -54,12 +60,12 @@ static float knot(int32_t a, int32_t b, uint32_t salt) {
   return (float)((h ^ (h >> 15)) >> 8) * (2.0f / 16777216.0f) - 1;
 }
 
-// Value noise in [-1, 1] along a surface, cells of 1.3 mm.
-static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt) {
+// Value noise in [-1, 1] along a surface, so many cells per metre.
+static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt, float per_m) {
   const float *row = echo->row;
   float r = hypotf(row[PLANE_ACROSS * echo->padded + l], row[PLANE_UP * echo->padded + l]);
   float round = row[PLANE_THETA * echo->padded + l] * r;
-  float u = round * 750, v = row[PLANE_S * echo->padded + l] * 750;
+  float u = round * per_m, v = row[PLANE_S * echo->padded + l] * per_m;
   float fu = floorf(u), fv = floorf(v), a = u - fu, b = v - fv;
   int32_t i = (int32_t)fu, j = (int32_t)fv;
   float top = knot(i, j, salt) + a * (knot(i + 1, j, salt) - knot(i, j, salt));
@@ -113,8 +119,13 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
     for (uint32_t i = 0; i < sheets; ++i) {
       const uint32_t which = sheet[i].level;
       const float *level = now + which * n;
-      const float last = before[which * n + l] - sheet[i].beyond_m;
-      const float here = level[l] - sheet[i].beyond_m;
+      float beyond = sheet[i].beyond_m;
+      // The sheets of a fascia come nearer to each other and go apart.
+      if (which == FASCIA && beyond > 0) {
+        if (level[l] < 0 || before[which * n + l] > 2 * beyond) continue;
+        beyond *= 1 + 0.5f * roughness(echo, l, 64 * (FASCIA_SHEETS + i), spread_per_m);
+      }
+      const float last = before[which * n + l] - beyond, here = level[l] - beyond;
       if ((last < 0) == (here < 0) || is_hidden(echo, now, l, which)) continue;
       // What reflects, and the salt of its roughness: it stays whatever else is in view.
       const interface *kind = &interfaces[which % LAYER_LEVELS];
@@ -131,14 +142,46 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
       float t = last / (last - here), slope = (here - last) / dz;
       float across = (level[right] - level[left]) / (float)(right - left);
       float rise = -across / (SONDE_FINE * (fabsf(slope) > 1e-6f ? slope : 1e-6f));
-      float rough = echo->plain ? 0 : 4 * roughness(echo, l, salt + 64 * sheet[i].sheet);
-      if (sheet[i].sheet > 0) rough = 2.5f * rough + (float)sheet[i].sheet * next_sheet_db;
+      float rough = 0;
+      if (!echo->plain) {
+        // Patches of some millimetres in which a sheet is missing or strong, and finer ones.
+        salt += 64 * sheet[i].sheet;
+        rough = 4 * roughness(echo, l, salt, rough_per_m);
+        if (which != 0 && which != CORTEX)
+          rough += patch_db * (roughness(echo, l, salt + 32, patch_per_m) - 0.33f);
+        rough += (float)sheet[i].sheet * next_sheet_db;
+      }
       float amplitude = echo->coupling[l] * amplitude_of_db(kind->db + rough - echo->loss_db[l]);
       sonde_sheet_add(echo, l, ((float)row - 1 + t) * dz, rise, amplitude);
       echo->loss_db[l] += kind->loss_db;
       if (which == CORTEX)
         echo->rough[l] *= amplitude_of_db(kind->loss_db); // facets lie above the loss
     }
+  }
+}
+
+// The septa of the fat are sheets, too. Half-way between two the distance jumps.
+static void add_septa(sonde_echo *echo, uint32_t row) {
+  const float *now = echo->septum[row % 2], *before = echo->septum[(row + 1) % 2];
+  const float *size = echo->septum[2];
+  const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  const uint32_t n = echo->padded, edges = LAYER_LEVELS + echo->shown_count;
+  for (uint32_t l = 0; l < echo->lines; ++l) {
+    const float last = before[l], here = now[l], step = here - last;
+    if (!(size[l] > 0) || (last < 0) == (here < 0) || fabsf(step) > 0.8e-3f || echo->air[l])
+      continue;
+    bool hidden = false;
+    for (uint32_t k = LAYER_LEVELS; k < edges; ++k)
+      hidden = hidden || echo->level[row % 2][k * n + l] < 0;
+    if (hidden) continue;
+    const uint32_t left = l > 0 ? l - 1 : l, right = l + 1 < echo->lines ? l + 1 : l;
+    float across = (now[right] - now[left]) / (float)(right - left);
+    if (fabsf(across) > 0.4e-3f) continue; // jumps
+    const float slope = step / dz;
+    const float rise = -across / (SONDE_FINE * (fabsf(slope) > 1e-6f ? slope : 1e-6f));
+    const float amplitude =
+        echo->coupling[l] * size[l] * amplitude_of_db(septum_db - echo->loss_db[l]);
+    sonde_sheet_add(echo, l, ((float)row - 1 + last / (last - here)) * dz, rise, amplitude);
   }
 }
 
@@ -184,46 +227,27 @@ static void store_gain(sonde_echo *echo, uint32_t row) {
   for (uint32_t l = last + 1; l < echo->gain_stride; ++l) gain[l] = gain[last];
 }
 
-// Materials of what is in view.
-static void describe_tissue(sonde_echo *echo, tissue_job *job) {
-  const sonde_interior *in = echo->interior;
-  job->vessels = echo->shown_count, job->lesions = echo->lesion_count;
-  job->webs = (float)in->findings.webs, job->oedema = (float)in->findings.oedema;
-  // A fresh clot (echogenicity 0.25) scatters as blood does and is as even; old ones are brighter,
-  // with lumps and layers.
-  const float fresh = 0.25f, fresh_db = -24.4f, db_per_echogenicity = 24;
-  for (uint32_t k = 0; k < job->vessels; ++k) {
-    const uint32_t which = echo->shown[k];
-    const sonde_pathology *p = sonde_echo_pathology(echo, which);
-    float wall = wall_m[in->course[which].kind];
-    const float radius = (float)in->section[which][0].radius_m;
-    if (which >= 2) wall = fminf(wall, thin_wall * radius);
-    echo->wall_m[k] = wall;
-    float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
-    bool vein = in->course[which].kind == SONDE_VESSEL_VEIN;
-    job->vessel[k] =
-        (tissue_vessel){.wall_m = wall,
-                        .sheath_m = echo->plain ? 0 : fminf(sheath_share * radius, most_sheath_m),
-                        .clot_fraction = vein ? (float)p->thrombus_fraction : 0,
-                        .clot_scatter = amplitude_of_db(fresh_db + db_per_echogenicity * more),
-                        .clot_loss = 18 + 40 * age,
-                        .lumps_db = 1.5f + 4 * age,
-                        .layers_db = 8 * age,
-                        .number = which};
-  }
-  for (uint32_t k = 0; k < job->lesions; ++k) {
-    const sonde_lesion *l = &in->findings.lesion[echo->lesion[k]];
-    job->lesion[k] = (tissue_lesion){
-        (tissue_lesion_kind)l->kind,
-        {(float)(1 / l->half_m.x), (float)(1 / l->half_m.y), (float)(1 / l->half_m.z)},
-        (float)l->echogenicity};
+// What a model's tissue map has in view: bodies and muscles.
+static void describe_map(const sonde_echo *echo, tissue_job *job) {
+  const struct sonde_tissue_map *map = echo->interior->model->map;
+  SONDE_ASSERT(echo->cell_count <= MOST_CELLS && echo->body_count <= MOST_BODIES);
+  const sonde_vec3 look = sonde_echo_middle(&echo->frame);
+  const sonde_vec3 beam = q_rotate(echo->frame.probe.rotation, vec3(0, 0, 1));
+  job->bodies = map != NULL ? echo->body_count : 0;
+  for (uint32_t k = 0; k < job->bodies; ++k) {
+    const sonde_map_body body = map->body(map->self, echo->body[k], look);
+    const double along = v_dot(body.axis, beam), length = body.half_m.z > 0 ? body.half_m.z : 1;
+    job->body[k] = (tissue_body){body.tissue == SONDE_TISSUE_NERVE    ? TISSUE_NERVE
+                                 : body.tissue == SONDE_TISSUE_TENDON ? TISSUE_TENDON
+                                                                      : TISSUE_LYMPH,
+                                 {(float)body.half_m.x, (float)body.half_m.y, (float)length},
+                                 (float)sqrt(fmax(1 - along * along, 0))};
   }
   // Muscles: their fibres lean against the skin, and each has a brightness of its own.
-  const struct sonde_tissue_map *map = in->model->map;
+  memset(job->fact, 0, sizeof job->fact);
+  job->fact[CELL_LEAN][0] = thigh_lean;
   job->cells = map != NULL ? echo->cell_count : 0;
   if (job->cells > 0) {
-    const sonde_vec3 look = sonde_echo_middle(&echo->frame);
-    const sonde_vec3 beam = q_rotate(echo->frame.probe.rotation, vec3(0, 0, 1));
     const double flat = fmax(hypot(beam.x, beam.y), 0.1);
     double power[MOST_CELLS];
     sonde_vec3 at[MOST_CELLS];
@@ -236,23 +260,53 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
                                    .y_mm = (float)(1e3 * at[k].y),
                                    .cell = (float)seed.cell,
                                    .section = (float)seed.section};
-      // Axes of the tile: z across the fibres and away from the bone, y along them. Each cell
-      // starts elsewhere in the tile.
-      const sonde_vec3 fibre = seed.grain, out = seed.out;
-      const sonde_vec3 deep = v_unit(v_madd(out, -v_dot(out, fibre), fibre), vec3(1, 0, 0));
-      const sonde_vec3 axis[3] = {v_cross(fibre, deep), fibre, deep};
-      static const double per_m[3] = {1 / 0.3e-3, 1 / 0.8e-3, 1 / 0.25e-3};
-      for (int c = 0; c < 3; ++c) {
-        const sonde_vec3 row = v_scale(axis[c], per_m[c]);
-        job->fact[CELL_VOXEL + c][k] = 32 * (1 + knot((int32_t)seed.cell, c + 1, CELL_SALT));
-        for (int d = 0; d < 3; ++d)
-          job->fact[CELL_VOXEL + 3 + 3 * c + d][k] = (float)v_coordinate(row, d);
-      }
+      // Each cell starts elsewhere in the tile.
+      for (int c = 0; c < 3; ++c)
+        job->fact[CELL_SHIFT + c][k] = 32 * (1 + knot((int32_t)seed.cell, c + 1, CELL_SALT));
       job->fact[CELL_MUSCLE][k] = seed.muscle ? 1 : 0;
       job->fact[CELL_GAIN][k] = amplitude_of_db(most_cell_db * own);
-      job->fact[CELL_FACING][k] = (float)fabs(v_dot(deep, beam));
+      job->fact[CELL_LEAN][k] = (float)seed.lean;
     }
   }
+}
+
+// Materials of what is in view.
+static void describe_tissue(sonde_echo *echo, tissue_job *job) {
+  const sonde_interior *in = echo->interior;
+  job->vessels = echo->shown_count, job->lesions = echo->lesion_count;
+  job->webs = (float)in->findings.webs, job->oedema = (float)in->findings.oedema;
+  // A fresh clot (echogenicity 0.25) scatters as blood does, with faint lines of Zahn; old ones are
+  // brighter in the mean, with lumps and layers, but each case draws its own level, so that the
+  // brightness does not tell the age.
+  const float fresh = 0.25f, fresh_db = -24.4f, db_per_echogenicity = 20;
+  for (uint32_t k = 0; k < job->vessels; ++k) {
+    const uint32_t which = echo->shown[k];
+    const sonde_pathology *p = sonde_echo_pathology(echo, which);
+    float wall = wall_m[in->course[which].kind];
+    const float radius = (float)in->section[which][0].radius_m;
+    if (which >= 2) wall = fminf(wall, thin_wall * radius);
+    echo->wall_m[k] = wall;
+    float more = (float)p->echogenicity - fresh, age = fminf(fmaxf(more / 0.7f, 0), 1);
+    const float drawn = case_db * sqrtf(age) * knot((int32_t)echo->seed, (int32_t)which, CELL_SALT);
+    bool vein = in->course[which].kind == SONDE_VESSEL_VEIN;
+    job->vessel[k] = (tissue_vessel){
+        .wall_m = wall,
+        .sheath_m = echo->plain ? 0 : fminf(sheath_share * radius, most_sheath_m),
+        .clot_fraction = vein ? (float)p->thrombus_fraction : 0,
+        .clot_scatter = amplitude_of_db(fresh_db + db_per_echogenicity * more + drawn),
+        .clot_loss = 18 + 40 * age,
+        .lumps_db = 1.5f + 4 * age,
+        .layers_db = 2.5f + 5.5f * age,
+        .number = which};
+  }
+  for (uint32_t k = 0; k < job->lesions; ++k) {
+    const sonde_lesion *l = &in->findings.lesion[echo->lesion[k]];
+    job->lesion[k] = (tissue_lesion){
+        (tissue_lesion_kind)l->kind,
+        {(float)(1 / l->half_m.x), (float)(1 / l->half_m.y), (float)(1 / l->half_m.z)},
+        (float)l->echogenicity};
+  }
+  describe_map(echo, job);
   // Facets of the cortex lie thinner than the pulse is long, which they fill only in part. The
   // energy of a tent is two thirds of its height's over its half width; that of the pulse is 0.83
   // wavelengths of its peak's.
@@ -261,6 +315,7 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
   float filled = 0.83f * (float)echo->frame.wavelength_m / (job->rough_m * 2 / 3);
   job->rough_bone = echo->plain ? 0 : rough_share * amplitude_of_db(interfaces[CORTEX].db);
   job->rough_bone *= sqrtf(1 + filled);
+  job->periosteum = echo->plain ? 0 : amplitude_of_db(periosteum_db);
 }
 
 void sonde_echo_medium(sonde_echo *echo) {
@@ -278,6 +333,7 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .scatter = echo->scatter,
                     .loss = echo->loss,
                     .rough = echo->rough,
+                    .septum_size = echo->septum[2],
                     .crossed = crossed};
   describe_tissue(echo, &job);
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
@@ -307,6 +363,7 @@ void sonde_echo_medium(sonde_echo *echo) {
       }
     echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
                        echo->row, size);
+    job.septum = echo->septum[row % 2];
     job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
     job.rows_per_m = (float)((SONDE_MEDIUM_ROWS - 1) / f->depth_m);
@@ -323,6 +380,7 @@ void sonde_echo_medium(sonde_echo *echo) {
     blur(echo, echo->loss_db);
     blur(echo, echo->tail);
     if (row > 0) add_interfaces(echo, row, crossed);
+    if (row > 0 && !echo->plain) add_septa(echo, row);
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
       if (echo->air[l]) echo->scatter[l] = echo->rough[l] = 0;
     for (uint32_t l = 0; l < lines; ++l)

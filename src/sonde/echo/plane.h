@@ -30,9 +30,11 @@ enum {
   LESION_FIELDS = 3, // coordinates at rest over the semi-axes
   MOST_VESSELS = 16, // in view at once
   MOST_LESIONS = 8,
+  MOST_BODIES = 8, // nerves, tendons and nodes in view, of such a model
+  BODY_FIELDS = 3, // place in a body over its semi-axes, along a cord in m
   MOST_CELLS = 16, // seeds of muscles' cells in view, of a model with a tissue map
-  MOST_FIELDS =
-      PLANE_LAYERS + MOST_VESSELS * VESSEL_FIELDS + MOST_LESIONS * LESION_FIELDS + 1 + MOST_CELLS
+  MOST_FIELDS = PLANE_LAYERS + MOST_VESSELS * VESSEL_FIELDS + MOST_LESIONS * LESION_FIELDS + 1 +
+                MOST_CELLS + MOST_BODIES * BODY_FIELDS
 };
 
 static inline uint32_t vessel_field_at(uint32_t vessel, vessel_field field) {
@@ -42,8 +44,8 @@ static inline uint32_t lesion_field_at(uint32_t vessels, uint32_t lesion, uint32
   return (uint32_t)PLANE_LAYERS + vessels * VESSEL_FIELDS + lesion * LESION_FIELDS + axis;
 }
 // Of a model with a tissue map: distance to the superficial fascia, m, then |p - seed|^2 - weight
-// of each seed, mm^2. Its square terms are the same for all seeds, so that differences are linear
-// in p.
+// of each seed, mm^2, then the places in its bodies. Its square terms are the same for all seeds,
+// so that differences are linear in p.
 static inline uint32_t map_field_at(uint32_t vessels, uint32_t lesions, uint32_t which) {
   return lesion_field_at(vessels, lesions, 0) + which;
 }

@@ -93,6 +93,11 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
     *field = (float)depths.superficial_m;
     for (uint32_t k = 0; k < echo->cell_count; ++k)
       field[(k + 1) * count] = (float)(1e6 * power[k]);
+    field += (1 + echo->cell_count) * count;
+    for (uint32_t k = 0; k < echo->body_count; ++k) {
+      const sonde_vec3 q = map->body_place(map->self, echo->body[k], rest);
+      for (int c = 0; c < BODY_FIELDS; ++c, field += count) *field = (float)v_coordinate(q, c);
+    }
   }
   // Coordinates in the lesions.
   for (uint32_t k = 0; k < echo->lesion_count; ++k) {
@@ -248,13 +253,15 @@ static void find_in_view(sonde_echo *echo) {
   }
   // Muscles around the picture's middle.
   const struct sonde_tissue_map *map = in->model->map;
-  echo->cell_count = 0;
+  echo->cell_count = echo->body_count = 0;
   if (map != NULL) {
+    if (!echo->plain)
+      echo->body_count = map->bodies(map->self, middle, 0.5 * picture_m, MOST_BODIES, echo->body);
     echo->cell_count =
         map->seeds(map->self, sonde_echo_middle(f), INFINITY, MOST_CELLS, echo->cell);
   }
   echo->fields = lesion_field_at(echo->shown_count, echo->lesion_count, 0) +
-                 (map != NULL ? 1 + echo->cell_count : 0);
+                 (map != NULL ? 1 + echo->cell_count + BODY_FIELDS * echo->body_count : 0);
   echo->levels = LAYER_LEVELS + echo->shown_count + echo->lesion_count;
   SONDE_ASSERT(echo->fields <= MOST_FIELDS && echo->levels <= MOST_LEVELS);
 }

@@ -104,23 +104,23 @@ static void pack(const draft *d, uint32_t *word) {
 // 1.6 and 0.57 mm in patches, a few upright ones every 4 mm, and dark grain.
 static void draw_fat(draft *d, uint32_t *word) {
   float *bend = d->noise[0], *fine = d->noise[1], *strength = d->noise[2], *other = d->noise[3];
-  const sheets first = {10, 1.6f, 0.24f, 2.6f, 0.75f, 0.4f};
+  const sheets first = {10, 1.6f, 0.22f, 2.6f, 0.5f, 0.5f};
   const sheets second = {28, 0.57f, 0.16f, 1.3f, 0.4f, 0.5f};
   const sheets upright = {8, 4, 0.35f, 1.0f, -0.1f, 0.6f};
   draw_noise(d, bend, 6, 6, 5);
   draw_noise(d, fine, 13, 13, 8);
   for (uint32_t i = 0; i < VOXELS; ++i) bend[i] += 0.35f * fine[i];
-  draw_noise(d, strength, 9, 9, 10);
-  add_sheets(d->facing, &first, bend, 0.42f, strength);
+  draw_noise(d, strength, 7, 7, 10);
+  add_sheets(d->facing, &first, bend, 0.32f, strength);
   draw_noise(d, strength, 15, 15, 28);
-  add_sheets(d->facing, &second, bend, 1.2f, strength);
+  add_sheets(d->facing, &second, bend, 0.9f, strength);
   draw_noise(d, strength, 8, 8, 10);
   draw_noise(d, other, 16, 16, 16);
   add_upright(d->body, 0, &upright, other, 0.25f, strength);
   draw_noise(d, strength, 8, 8, 10);
   add_upright(d->body, 1, &upright, other, 0.25f, strength);
   draw_noise(d, fine, 26, 26, 40);
-  for (uint32_t i = 0; i < VOXELS; ++i) d->body[i] += 0.16f * exp2f(0.5f * fine[i]);
+  for (uint32_t i = 0; i < VOXELS; ++i) d->body[i] += 0.13f * exp2f(0.5f * fine[i]);
   pack(d, word);
 }
 
@@ -129,9 +129,9 @@ static void draw_fat(draft *d, uint32_t *word) {
 // ones every 2.4 mm, bundles of 0.45 mm.
 static void draw_muscle(draft *d, uint32_t *word) {
   float *bend = d->noise[0], *fine = d->noise[1], *strength = d->noise[2], *other = d->noise[3];
-  const sheets first = {12, 1.33f, 0.36f, 2.2f, 0.4f, 0.6f};
+  const sheets first = {12, 1.33f, 0.36f, 2.8f, 0.35f, 0.6f};
   const sheets second = {26, 0.62f, 0.22f, 1.0f, 0.3f, 0.55f};
-  const sheets upright = {8, 2.4f, 0.35f, 0.7f, 0.2f, 0.6f};
+  const sheets upright = {8, 2.4f, 0.35f, 0.5f, 0.2f, 0.6f};
   draw_noise(d, bend, 7, 5, 6);
   draw_noise(d, fine, 14, 5, 12);
   for (uint32_t i = 0; i < VOXELS; ++i) bend[i] += 0.4f * fine[i];
@@ -146,7 +146,7 @@ static void draw_muscle(draft *d, uint32_t *word) {
   draw_noise(d, other, 5, 5, 4);
   for (uint32_t i = 0; i < VOXELS; ++i) {
     const float slow = exp2f(0.35f * other[i]);
-    d->body[i] = slow * (d->body[i] + 0.14f * exp2f(0.55f * fine[i])), d->facing[i] *= slow;
+    d->body[i] = slow * (d->body[i] + 0.13f * exp2f(0.55f * fine[i])), d->facing[i] *= slow;
   }
   pack(d, word);
 }

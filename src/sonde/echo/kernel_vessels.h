@@ -1,0 +1,86 @@
+// Vessels along one row of the march: walls, lumina, clot.
+// Included by kernel_tissue.h only.
+#ifndef SONDE_SRC_ECHO_KERNEL_VESSELS_H
+#define SONDE_SRC_ECHO_KERNEL_VESSELS_H
+
+#include "base/base.h"
+#include "echo/kernel.h"
+#include "echo/kernel_texture.h"
+#include "echo/kernel_bodies.h"
+#include "interior/clot.h"
+
+// Backscatter over muscle (amplitude) and attenuation (dB/m/MHz one way); docs/echo.md.
+static const float wall_tissue[2] = {1.9f, 110}, blood_tissue[2] = {0.06f, 18};
+static const float wall_body = 0.5f; // of a vessel's wall along the beam
+
+// Signed distance over the row, metres (negative inside): to first order (F - 1)/|grad F| of the
+// ellipse F = 1.
+INLINE floats wall_distance(floats a, floats b, floats half_a, floats half_b) {
+  floats square = a * a + b * b, size = vsqrt(square);
+  floats ga = a / half_a, gb = b / half_b, steep = vsqrt(ga * ga + gb * gb);
+  floats distance = vselect(steep > 1e-3f, (size - 1) * size / vmax(steep, vset(1e-3f)), -half_a);
+  floats beyond = (vabs(b) - 1) * half_b; // bounds the estimate beside a flat ellipse's tips
+  distance = vselect((beyond > 0) & (beyond > distance), beyond, distance);
+  return vselect(square > 400, vset(1), distance);
+}
+
+// sonde_clot_surface() for a vector of places.
+INLINE floats clot_surface(uint32_t vessel, floats along, floats across) {
+  floats sum = clot_bend * (clot_level - across * across), c, s;
+  for (uint32_t k = 0; k < CLOT_WAVES; ++k) {
+    const clot_wave *w = &clot_waves[k];
+    floats turns = w->across * across + w->per_m * along + sonde_clot_start(vessel, k);
+    turn(turns - vfloor(turns), &c, &s);
+    sum += w->height * c;
+  }
+  return sum;
+}
+
+// Unevenness of a clot, dB: lumps of 2 mm and finer grain, and the layers in which it grew.
+INLINE floats clot_grain(const tissue_vessel *it, knots *memory, floats theta, floats s,
+                         floats depth, floats inward) {
+  floats lump = texture(memory, theta, s * 400, depth * 600, 4 * TURNS_MUSCLE, 13);
+  floats layer = sheet(inward * 2.2f + 0.6f * lump, 0.6f);
+  return it->lumps_db * lump + it->layers_db * (layer - 0.3f);
+}
+
+// Walls hide lesions, lumina walls: branches begin in the lumen of their parents. Clot last.
+INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const floats *level,
+                    const float *before, floats out[2]) {
+  const uint32_t n = job->lines;
+  for (uint32_t v = job->vessels; v-- > 0;) {
+    const ints wall = level[v] < job->vessel[v].wall_m;
+    if (vany(wall)) {
+      // Where the beam grazes it, the wall is as grey as what lies around it.
+      floats slope = vabs(level[v] - vload(before + v * n)) * job->rows_per_m;
+      floats square = vmin(slope * slope, vset(1));
+      floats scatter = vset(wall_tissue[0]);
+      if (!job->plain) scatter = wall_body + (wall_tissue[0] - wall_body) * (square * square);
+      mark(wall, scatter, wall_tissue[1], out);
+    }
+    mark(level[v] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
+  }
+  for (uint32_t v = 2; v < job->vessels; ++v)
+    mark(level[v] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
+  for (uint32_t v = 0; v < job->vessels; ++v) {
+    const tissue_vessel *it = &job->vessel[v];
+    if (!(it->clot_fraction > 0)) continue;
+    const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n;
+    ints clot = (level[v] <= 0) & (vload(at + VESSEL_CLOT * n) >= 0.5f);
+    floats theta = vload(f + PLANE_THETA * n), s = vload(f + PLANE_S * n),
+           depth = vload(f + PLANE_DEPTH * n);
+    if (!vany(clot)) continue;
+    if (it->clot_fraction < 1)
+      clot &= -vload(at) > 1 - 2 * it->clot_fraction + clot_surface(it->number, s, vload(at + n));
+    floats scatter = vset(it->clot_scatter);
+    if (!job->plain)
+      scatter =
+          scatter * power2(clot_grain(it, memory, theta, s, depth, vload(at)) * 0.16609640474f);
+    if (v == 0 && job->webs > 0 && vany(clot))
+      scatter =
+          scatter * (1 - 0.6f * job->webs) + job->webs * webs(memory, theta, s, depth, vload(at));
+    mark(clot, scatter, it->clot_loss, out);
+  }
+}
+
+#endif
