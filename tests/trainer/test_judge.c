@@ -174,6 +174,37 @@ static void each_vein_of_a_pair_closes(void **state) {
   }
 }
 
+// Other veins in the picture change nothing of an exam that does not ask for them.
+static void veins_beside_change_nothing(void **state) {
+  (void)state;
+  sonde_vein_map map = branched_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  sonde_judge *judge[2];
+  const double open[3] = {0.9, 0.9, 0.9}, aside_m[3] = {0, 0, 0};
+  for (int k = 0; k < 2; ++k) {
+    assert_int_equal(sonde_judge_create(&map, &plan, &judge[k], NULL), SONDE_OK);
+    const test_press press[] = {closing(0.03), staying_open(0.11), {0.15, 8, 0.6, 0.9, 0.1}};
+    for (uint32_t i = 0; i < SONDE_COUNT_OF(press); ++i) {
+      if (k == 0)
+        feed_press(judge[k], &press[i], 3.0 * i, 0.03);
+      else
+        feed_cuts(judge[k], &press[i], 3.0 * i, open, aside_m);
+    }
+  }
+  uint32_t count[2];
+  const sonde_compression *p = sonde_judge_compressions(judge[0], &count[0]);
+  const sonde_compression *q = sonde_judge_compressions(judge[1], &count[1]);
+  assert_true(count[0] == 3 && count[1] == 3);
+  for (int i = 0; i < 3; ++i) {
+    assert_true(p[i].result == q[i].result && p[i].examined == q[i].examined);
+    assert_true(p[i].along_m == q[i].along_m && p[i].vein_ratio == q[i].vein_ratio);
+  }
+  sonde_metrics a = sonde_judge_metrics(judge[0]), b = sonde_judge_metrics(judge[1]);
+  assert_memory_equal(&a, &b, sizeof a);
+  for (int k = 0; k < 2; ++k) sonde_judge_destroy(judge[k]);
+}
+
 // Beyond the reach of the station a vein that closes examines nothing; from behind neither. The
 // guidance sends the probe round the leg.
 static void a_station_is_where_its_vein_is(void **state) {
@@ -549,6 +580,7 @@ int main(void) {
       cmocka_unit_test(what_is_shown_is_what_is_judged),
       cmocka_unit_test(a_double_vein_is_closed_when_both_are),
       cmocka_unit_test(each_vein_of_a_pair_closes),
+      cmocka_unit_test(veins_beside_change_nothing),
       cmocka_unit_test(a_station_is_where_its_vein_is),
       cmocka_unit_test(the_order_does_not_matter),
       cmocka_unit_test(coverage_adds_up),
