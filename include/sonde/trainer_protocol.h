@@ -87,7 +87,7 @@ SONDE_API sonde_status sonde_plan_make(const sonde_exam_protocol *protocol,
 /** Finds the force of every place by pressing a healthy vein there: the case's thigh, posture and
  *  oedema, the linear probe straight above the vein at 12 mm/s, the inside by finite elements as in
  * a session; no clot, breath or strain. Places of one station share the force that closes the veins
- * of all of them. About 0.3 s of a core's time for each place.
+ * of all of them. About 2 s of a core's time for each place in a limb.
  *  @param setup of the case whose map the plan was made with
  *  @return MISMATCH for a place where the healthy vein does not close at 60 N, or 60 mm deep;
  *    CANCELLED; MEMORY @thread owner */

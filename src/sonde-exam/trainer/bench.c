@@ -49,9 +49,11 @@ sonde_snapshot sonde_bench_look(sonde_bench *bench, sonde_pose probe) {
                       .vein_rest_m = {nan_m, nan_m, nan_m},
                       .vein_tilt_rad = nan_m};
   bool pressing = s.force_normal_n > TOUCH_N && s.force_normal_n < FORCE_MAX_N;
+  sonde_pathology pathology = bench->pathology;
+  sonde_circulation_apply(&bench->circulation, bench->tick, BENCH_STEP_S, &pathology);
+  s.venous_pressure_pa = pathology.venous_pressure_pa;
+  s.arterial_pressure_pa = pathology.arterial_pressure_pa;
   if (pressing) { // vessels at the image plane
-    sonde_pathology pathology = bench->pathology;
-    sonde_circulation_apply(&bench->circulation, bench->tick, BENCH_STEP_S, &pathology);
     double since_s = (double)(bench->tick - bench->looked_tick) * BENCH_STEP_S;
     sonde_interior_input input = {.positions_m = sonde_state_positions(bench->state),
                                   .contact_forces_n = sonde_state_contact_forces(bench->state),

@@ -22,6 +22,7 @@ typedef struct habit {
   uint32_t attempts;                 // at a place, until it is clear
   bool confirm, guess;               // repeats what looks open; calls what it has not seen
   bool hesitant;                     // stops while pressing
+  bool patient;                      // waits while the patient strains
 } habit;
 
 static const habit HABIT[] = {
@@ -39,7 +40,8 @@ static const habit HABIT[] = {
      .wander_m = 0,
      .rate_n_s = 12,
      .attempts = 2,
-     .confirm = true},
+     .confirm = true,
+     .patient = true},
     {.name = "novice",
      .skip = 0.5,
      .along_m = 0.006,
@@ -97,6 +99,7 @@ static const double GIVES_WAY = 0.8; // share of the force so far, once above SL
 static const double SLIP_SHARE = 0.6, CALL_SHARE = 0.32; // of the place's firm force
 static const double NEAR_LIMIT = 0.95, RELEASE_M_S = 0.08;
 static const double ARCH_M = 0.03, ARCH_TURNED_M = 0.05; // out of a way through the air
+static const double STRAINS_PA = 5 * SONDE_PA_PER_MMHG;  // above the calm pressure: wide veins
 static const double FLIGHT = 2; // speed through the air over that along the skin
 
 typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, DONE } phase;
@@ -114,7 +117,7 @@ struct sonde_operator {
   uint32_t place, attempt, opens;
   double along_m, across_m, twist_rad, depth_m; // where the hand is told to be, from the place
   bool flying;                                  // through the air to the place, from `left`
-  double flown;                                 // share of that way
+  double flown, way_m;                          // share of that way, its length
   sonde_pose left;
   double sway_m, sway_across_m;              // beside it, while looking
   double aim_m, aim_across_m, aim_twist_rad; // at this attempt
@@ -122,6 +125,7 @@ struct sonde_operator {
   double stop_n, wait_s, last_s;
   double ratio, peak_n;        // of this press; NaN: not seen
   double felt_n, felt_depth_m; // at the last look
+  double calm_pa;              // least venous pressure so far
   bool started;
 };
 
@@ -210,6 +214,11 @@ static void begin_place(sonde_operator *op, uint32_t place) {
     op->left = pose_at(op);
     op->flying = (old->station || next->station) && !sonde_same_stand(old, next);
     op->flown = 0;
+    sonde_vec3 a = op->left.position, b = next->at.skin_m;
+    sonde_vec3 from = v_sub(a, middle_at(&op->map, a.z)), to = v_sub(b, middle_at(&op->map, b.z));
+    double turn = acos(clamp(v_dot(from, to) / (v_norm(from) * v_norm(to)), -1, 1));
+    double out_m = fmax(v_norm(from), v_norm(to)) + ARCH_M + ARCH_TURNED_M * turn / SONDE_PI;
+    op->way_m = hypot(turn * out_m, a.z - b.z) + 2 * (ARCH_M + ARCH_TURNED_M);
     op->along_m += old->station || next->station ? 0 : old->at.along_m - next->at.along_m;
     if (op->flying) op->along_m = op->across_m = 0;
   }
@@ -285,6 +294,7 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
   SONDE_ASSERT(op && s);
   const habit *h = &op->habit;
   double dt_s = op->started ? clamp(s->time_s - op->last_s, 0, 0.2) : 0;
+  op->calm_pa = op->started ? fmin(op->calm_pa, s->venous_pressure_pa) : s->venous_pressure_pa;
   op->started = true;
   op->last_s = s->time_s;
   double vein = (double)NAN; // how open the veins are that the place asks for
@@ -298,13 +308,7 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
   case TRAVEL: {
     double step = h->travel_m_s * dt_s, goal_m = op->aim_m + op->beyond_m;
     if (op->flying) {
-      const double least_m = 0.02;
-      sonde_vec3 a = op->left.position, b = op->plan.point[op->place].at.skin_m;
-      sonde_vec3 from = v_sub(a, middle_at(&op->map, a.z)), to = v_sub(b, middle_at(&op->map, b.z));
-      double turn = acos(clamp(v_dot(from, to) / (v_norm(from) * v_norm(to)), -1, 1));
-      double out_m = fmax(v_norm(from), v_norm(to)) + ARCH_M + ARCH_TURNED_M * turn / SONDE_PI;
-      double way_m = hypot(turn * out_m, a.z - b.z) + 2 * (ARCH_M + ARCH_TURNED_M);
-      op->flown = fmin(1, op->flown + FLIGHT * step / fmax(way_m, least_m));
+      op->flown = fmin(1, op->flown + FLIGHT * step / op->way_m);
       op->flying = op->flown < 1;
       break;
     }
@@ -323,7 +327,8 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     double reach_m = h->wander_m * clamp(op->wait_s, 0, 1); // comes to rest in the end
     op->sway_m = reach_m * sin(2 * SONDE_PI * 0.45 * s->time_s);
     op->sway_across_m = reach_m * sin(2 * SONDE_PI * 0.7 * s->time_s);
-    if (op->wait_s <= 0) op->phase = PRESS;
+    bool strains = h->patient && s->venous_pressure_pa > op->calm_pa + STRAINS_PA;
+    if (op->wait_s <= 0 && !strains) op->phase = PRESS;
     break;
   }
   case PRESS: {

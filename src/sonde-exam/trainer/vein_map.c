@@ -2,13 +2,15 @@
 // the segments of all veins, the stations.
 #include "trainer/judge.h"
 
+#include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { DIRECTIONS = 120, SMOOTH = 4 };
 static const double REACH_M = 0.2;
 static const double FACE_HALF_M = 0.025; // half of the picture's width: veins farther aside are not
                                          // in it
-enum { SLIDES = 6 };
+enum { SLIDES = 6, STEADY = 2 };
 static const double SLIDE_M = 0.002;
 
 static const struct {
@@ -170,23 +172,32 @@ static void find_stations(const sonde_model *model, const sonde_limb *limb, sond
       if (strcmp(OTHER[i][0], to->name) == 0) to->segment = sonde_vein_segment(map, OTHER[i][1]);
     if (to->segment == SONDE_SEGMENTS && isfinite(main_m.z))
       to->segment = sonde_vein_segment_at(map, main_m.z);
-    // A vein that begins or ends beside the station comes into view within a finger's breadth.
+    // A vein that begins or ends beside the station is looked for within a finger's breadth, where
+    // it stays in the plane when the tissue moves a little under the press.
     for (uint32_t i = 0; i < map->segment_count; ++i) {
       const sonde_exam_segment *segment = &map->segment[i];
+      enum { ALL = SLIDES + STEADY };
+      sonde_vec3 at[2 * ALL + 1], y = q_rotate(to->probe.rotation, vec3(0, 1, 0));
       to->vein_m[i] = main_m;
-      for (int step = 0; segment->vein_count > 0 && step <= 2 * SLIDES; ++step) {
-        const int out = (step + 1) / 2;
+      if (segment->vein_count == 0) continue;
+      for (int step = -ALL; step <= ALL; ++step) {
         sonde_pose probe = to->probe;
-        to->slide_m[i] = (step % 2 ? SLIDE_M : -SLIDE_M) * out;
-        sonde_vec3 y = q_rotate(probe.rotation, vec3(0, 1, 0)); // along the skin
-        probe.position = v_madd(probe.position, (y.z < 0 ? -1 : 1) * to->slide_m[i], y);
+        probe.position = v_madd(probe.position, (y.z < 0 ? -SLIDE_M : SLIDE_M) * step, y);
         for (uint32_t v = segment->vein_count; v-- > 0;) {
           const uint32_t branch = segment->vein[v] - TRAINER_FIRST_BRANCH;
-          sonde_vec3 at = cross_line(&model->anatomy->branch[branch].line, probe);
-          if (isfinite(at.z) || v + 1 == segment->vein_count) to->vein_m[i] = at;
+          sonde_vec3 met = cross_line(&model->anatomy->branch[branch].line, probe);
+          if (isfinite(met.z) || v + 1 == segment->vein_count) at[step + ALL] = met;
         }
-        if (isfinite(to->vein_m[i].z)) break;
       }
+      int best = 0, least = INT_MAX; // the nearest steady one, else the nearest that is there
+      for (int step = -SLIDES; step <= SLIDES; ++step) {
+        bool steady = true;
+        for (int n = -STEADY; n <= STEADY; ++n) steady &= isfinite(at[step + n + ALL].z);
+        int rank = abs(step) + (steady ? 0 : 2 * SLIDES);
+        if (isfinite(at[step + ALL].z) && rank < least) least = rank, best = step;
+      }
+      to->vein_m[i] = at[best + ALL];
+      to->slide_m[i] = SLIDE_M * best;
     }
   }
 
