@@ -152,6 +152,40 @@ static void the_hand_goes_round_the_leg(void **state) {
   }
 }
 
+// Presses that begin while the patient strains, from 2 to 8 s: the expert waits, a timid hand does
+// not know.
+static void the_expert_waits_for_calm(void **state) {
+  (void)state;
+  sonde_vein_map map = straight_map();
+  sonde_exam_protocol protocol = every_20_mm();
+  sonde_plan plan = plan_of(&protocol, &map);
+  uint32_t begun[2] = {0};
+  for (int k = 0; k < 2; ++k) {
+    sonde_operator *op;
+    sonde_device hand;
+    assert_int_equal(
+        sonde_operator_create(k ? "timid" : "expert", 3, &map, &plan, 0.004, &op, &hand, NULL),
+        SONDE_OK);
+    uint64_t tick = 0;
+    double before_n = 0;
+    for (; !sonde_operator_done(op) && tick < 200000; ++tick) {
+      sonde_device_sample sample;
+      hand.read(hand.self, tick, &sample);
+      if (tick % 10) continue;
+      sonde_snapshot s = plant(sample.world_from_probe, 0.004 * (double)tick, 0);
+      bool strains = s.time_s > 2 && s.time_s < 8;
+      s.venous_pressure_pa = SONDE_PA_PER_MMHG * (strains ? 35 : 25);
+      if (s.time_s > 2.3 && s.time_s < 8 && before_n == 0) begun[k] += s.force_normal_n > 0;
+      before_n = s.force_normal_n;
+      sonde_operator_see(op, &s);
+    }
+    assert_true(sonde_operator_done(op));
+    hand.destroy(hand.self);
+    sonde_operator_destroy(op);
+  }
+  assert_true(begun[0] == 0 && begun[1] >= 1);
+}
+
 static void unknown_names_are_refused(void **state) {
   (void)state;
   sonde_vein_map map = straight_map();
@@ -169,7 +203,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_expert_finds_every_clot),   cmocka_unit_test(the_others_do_not_pass),
       cmocka_unit_test(faults_show_where_they_belong), cmocka_unit_test(equal_seeds_equal_exams),
-      cmocka_unit_test(the_hand_goes_round_the_leg),   cmocka_unit_test(unknown_names_are_refused),
+      cmocka_unit_test(the_hand_goes_round_the_leg),   cmocka_unit_test(the_expert_waits_for_calm),
+      cmocka_unit_test(unknown_names_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
