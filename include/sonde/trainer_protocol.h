@@ -93,9 +93,9 @@ SONDE_API sonde_status sonde_plan_make(const sonde_exam_protocol *protocol,
  *    CANCELLED; MEMORY @thread owner */
 SONDE_API sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *setup,
                                                const sonde_progress *progress, sonde_error *error);
-/** The place of the plan that is nearest along the vein, in reach or not; SONDE_PLAN_POINTS when
- * the plan is empty. @thread any */
-SONDE_API uint32_t sonde_plan_nearest(const sonde_plan *plan, double along_m);
+/** The place of the plan whose skin is nearest to a probe's face, in reach or not; of places at one
+ * station the first; SONDE_PLAN_POINTS when the plan is empty. @thread any */
+SONDE_API uint32_t sonde_plan_nearest(const sonde_plan *plan, sonde_vec3 face_m);
 
 #ifdef __cplusplus
 }

@@ -83,18 +83,6 @@ void sonde_judge_destroy(sonde_judge *judge) {
 
 // ---- one press
 
-// The place that is nearest to the probe's face: its force applies. Of places at one station the
-// first.
-static uint32_t nearest_place(const sonde_judge *judge, sonde_vec3 face_m) {
-  uint32_t nearest = SONDE_PLAN_POINTS;
-  double least = INFINITY;
-  for (uint32_t i = 0; i < judge->plan.count; ++i) {
-    double distance = v_distance(judge->plan.point[i].at.skin_m, face_m);
-    if (distance < least) least = distance, nearest = i;
-  }
-  return nearest;
-}
-
 sonde_force_target sonde_press_target(const sonde_judge *judge) {
   const double none = (double)NAN;
   uint32_t place = judge->now.place;
@@ -267,16 +255,17 @@ bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
     judge->trough_n = fmin(judge->trough_n, s->force_normal_n);
     if (s->force_normal_n >= BEGIN_N && s->force_normal_n >= judge->trough_n + RISE_N) {
       judge->pressing = true;
-      judge->now = (sonde_compression){.start_s = s->time_s - judge->first_s,
-                                       .segment = SONDE_SEGMENTS,
-                                       .point = SONDE_PLAN_POINTS,
-                                       .place = nearest_place(judge, s->world_from_probe.position),
-                                       .z_m = none,
-                                       .along_m = none,
-                                       .vein_ratio = none,
-                                       .artery_ratio = none,
-                                       .artery_least = none,
-                                       .tilt_rad = none};
+      judge->now = (sonde_compression){
+          .start_s = s->time_s - judge->first_s,
+          .segment = SONDE_SEGMENTS,
+          .point = SONDE_PLAN_POINTS,
+          .place = sonde_plan_nearest(&judge->plan, s->world_from_probe.position),
+          .z_m = none,
+          .along_m = none,
+          .vein_ratio = none,
+          .artery_ratio = none,
+          .artery_least = none,
+          .tilt_rad = none};
       for (uint32_t k = 0; k < SONDE_SEGMENTS; ++k)
         judge->view[k] = (sonde_vein_view){
             .ratio = none, .artery_ratio = none, .tilt_rad = none, .start_m = {none, none, none}};
@@ -330,8 +319,9 @@ sonde_judge_now sonde_judge_state(const sonde_judge *judge) {
   if (!judge->started) return now;
   if (judge->pressing) now.state = OF[sonde_press_weigh(judge).result];
   // The vein of the place at the probe.
-  uint32_t place = judge->pressing ? judge->now.place
-                                   : nearest_place(judge, judge->last.world_from_probe.position);
+  uint32_t place = judge->pressing
+                       ? judge->now.place
+                       : sonde_plan_nearest(&judge->plan, judge->last.world_from_probe.position);
   bool placed = place < judge->plan.count;
   uint32_t segment = placed ? judge->plan.point[place].segment : 0;
   now.vein_ratio = judge->view[sonde_segment_slot(&judge->map, segment)].now;

@@ -12,12 +12,12 @@ sonde_force_target sonde_force_target_make(double closes_n) {
       .closes_n = closes_n, .firm_n = ceil(closes_n), .limit_n = ceil(ROOM * closes_n + ROOM_N)};
 }
 
-uint32_t sonde_plan_nearest(const sonde_plan *plan, double along_m) {
+uint32_t sonde_plan_nearest(const sonde_plan *plan, sonde_vec3 face_m) {
   SONDE_ASSERT(plan && plan->count <= SONDE_PLAN_POINTS);
   uint32_t nearest = SONDE_PLAN_POINTS;
   double least = INFINITY;
   for (uint32_t i = 0; i < plan->count; ++i) {
-    double distance = fabs(plan->point[i].at.along_m - along_m);
+    double distance = v_distance(plan->point[i].at.skin_m, face_m);
     if (distance < least) least = distance, nearest = i;
   }
   return nearest;
