@@ -108,6 +108,46 @@ static double stiffness_at(const sonde_model *m, const char *landmark) {
   return m->sites[mark->site].k0_n_m3;
 }
 
+// Where the map says nerve, tendon or node, one of the bodies in reach of that kind holds the
+// point, and inside a body, away from its rim, the map says so.
+static void bodies_are_those_of_the_labels(void **state) {
+  (void)state;
+  enum { KINDS = 3, ROOM = 16 };
+  static const sonde_tissue kind[KINDS] = {SONDE_TISSUE_NERVE, SONDE_TISSUE_TENDON,
+                                           SONDE_TISSUE_NODE};
+  uint32_t labelled[KINDS] = {0}, held[KINDS] = {0};
+  const sonde_model *m = model[1];
+  const sonde_tissue_map *map = m->map;
+  double length = 0;
+  for (uint32_t i = 0; i < m->surface.vertex_count; ++i)
+    length = fmax(length, m->surface.vertices[i].z);
+  for (double z = 0.02; z < length - 0.03; z += 0.004)
+    for (double x = -0.1; x < 0.1; x += 1.7e-3)
+      for (double y = -0.1; y < 0.1; y += 1.7e-3) {
+        const sonde_vec3 p = vec3(x, y, z);
+        const sonde_tissue tissue = map->tissue(map->self, p);
+        for (uint32_t k = 0; k < KINDS; ++k) {
+          if (tissue != kind[k]) continue;
+          uint32_t id[ROOM];
+          const uint32_t count = map->bodies(map->self, p, 0.02, ROOM, id);
+          bool in = false;
+          for (uint32_t i = 0; i < count; ++i) {
+            const sonde_map_body b = map->body(map->self, id[i], p);
+            const sonde_vec3 q = map->body_place(map->self, id[i], p);
+            // A flat nerve's section is a band with round ends, its body's an ellipse.
+            const double along = b.half_m.z > 0 ? q.z : 0;
+            in = in || (b.tissue == tissue && q.x * q.x + q.y * q.y + along * along < 1.35);
+          }
+          ++labelled[k], held[k] += in;
+        }
+      }
+  for (uint32_t k = 0; k < KINDS; ++k) {
+    print_message("kind %u: %u of %u points in a body\n", k, held[k], labelled[k]);
+    assert_true(labelled[k] > (k == 2 ? 5 : 100));
+    assert_true(held[k] > 0.95 * labelled[k]);
+  }
+}
+
 static void springs_follow_the_tissue_below(void **state) {
   (void)state;
   for (uint32_t k = 0; k < MODELS; ++k) {
@@ -215,6 +255,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(surfaces_are_closed_and_the_map_lies_on_them),
       cmocka_unit_test(powers_are_those_of_the_labels),
+      cmocka_unit_test(bodies_are_those_of_the_labels),
       cmocka_unit_test(springs_follow_the_tissue_below),
       cmocka_unit_test(vessels_run_down_under_their_landmarks),
       cmocka_unit_test(a_left_model_is_the_mirror),
