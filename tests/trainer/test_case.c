@@ -278,7 +278,11 @@ static void save_and_load_again(const sonde_case *c) {
 
 static void drawn_cases_are_good(void **state) {
   (void)state;
-  uint32_t sick = 0, count = 0;
+  uint32_t sick = 0, count = 0, ways;
+  sonde_exam_protocol *protocols;
+  assert_int_equal(
+      sonde_exam_protocol_list(SONDE_SOURCE_DIR "/data/protocols", &protocols, &ways, NULL),
+      SONDE_OK);
   for (uint64_t seed = 1; seed <= 40; ++seed)
     for (int level = 0; level < 3; ++level) {
       sonde_case c, again;
@@ -292,8 +296,13 @@ static void drawn_cases_are_good(void **state) {
       sonde_case_setup setup;
       sonde_error error = {0};
       if (build(&c, &setup, &error)) fail_msg("%s", error.message);
+      for (uint32_t k = 0; k < ways; ++k) {
+        sonde_plan plan = plan_of(&protocols[k], &setup.map);
+        assert_true(plan.count >= protocols[k].stop_count);
+      }
       sonde_case_setup_clear(&setup);
     }
+  sonde_free(protocols);
   assert_true(sick > count / 4 && sick < 3 * count / 4);
 }
 
