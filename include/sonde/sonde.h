@@ -38,6 +38,7 @@
 #include "sonde/haptics_render.h"
 #include "sonde/files.h"
 #include "sonde/files_scanner.h"
+#include "sonde/flow.h"
 #include "sonde/limb.h"
 #include "sonde/limb_model.h"
 #include "sonde/limb_pose.h"

@@ -1,0 +1,140 @@
+/**
+ * @file flow.h
+ * Blood flow in a limb's main veins, and what pulsed Doppler sees of it: a network of segments from
+ * the calf to the right atrium, velocity profiles, the signal of a gate, its spectrum.
+ * docs/flow.md, docs/flow_theory.md.
+ *
+ * Flow towards the heart is positive. Velocities are mean velocities over the lumen unless a name
+ * says otherwise.
+ */
+#ifndef SONDE_FLOW_H
+#define SONDE_FLOW_H
+
+#include "sonde/limb.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- network ------------------------------------------------------------------------------ */
+
+/** Segments of the way to the heart, from the calf up. */
+typedef enum sonde_flow_segment {
+  SONDE_FLOW_CALF, /**< tibial, peroneal and muscle veins taken together */
+  SONDE_FLOW_POPLITEAL,
+  SONDE_FLOW_FEMORAL,
+  SONDE_FLOW_COMMON_FEMORAL,
+  SONDE_FLOW_EXTERNAL_ILIAC,
+  SONDE_FLOW_COMMON_ILIAC,
+  SONDE_FLOW_SEGMENTS
+} sonde_flow_segment;
+
+/** Name of a segment, such as "common-femoral". Never NULL. @thread any */
+SONDE_API const char *sonde_flow_segment_name(sonde_flow_segment segment);
+
+/** A patient's veins and what is done to them. */
+typedef struct sonde_flow_def {
+  double length_m[SONDE_FLOW_SEGMENTS]; /**< of the vein, > 0 */
+  double area_m2[SONDE_FLOW_SEGMENTS];  /**< of the lumen at rest, both of a pair together */
+  double closed[SONDE_FLOW_SEGMENTS]; /**< share of the area that a clot or a probe takes, 0 to 1 */
+  double leak;                        /**< what valves leave open to blood that falls back: 0
+                                           competent to 1 none */
+  double inflow_m3_s;                 /**< through all capillaries at rest, > 0; default 7e-6 */
+  double heart_rate_hz, breath_rate_hz; /**< default 1.15, 0.25 */
+  double breath_pa;                     /**< swing of the pressure in the belly; default 47 */
+  double squeeze_from_s, squeeze_pa;    /**< a hand on the calf for 1.2 s; default never */
+  double valsalva_from_s, valsalva_to_s, valsalva_pa; /**< default never; 4000 Pa */
+} sonde_flow_def;
+
+/** Typical veins, or those of a limb when it is not NULL. @thread any */
+SONDE_API sonde_flow_def sonde_flow_def_default(const sonde_limb *limb);
+
+/** Volumes, flows and valves of the segments: a value, to be copied freely. */
+typedef struct sonde_flow {
+  sonde_flow_def def;
+  double time_s;
+  double volume_m3[SONDE_FLOW_SEGMENTS];
+  double flow_m3_s[SONDE_FLOW_SEGMENTS]; /**< out of each segment, towards the heart */
+  double open[SONDE_FLOW_SEGMENTS];      /**< how far the segment's valve is open, 0 to 1 */
+} sonde_flow;
+
+/**
+ * Starts at t = 0 in the steady state without breath and manoeuvre.
+ * @return ARGUMENT naming the value of the definition that is out of range
+ * @thread any
+ */
+SONDE_API sonde_status sonde_flow_start(const sonde_flow_def *def, sonde_flow *flow,
+                                        sonde_error *error);
+/** One implicit step of dt_s (1e-5 to 1e-2). About a microsecond. @thread any (tick) */
+SONDE_API void sonde_flow_step(sonde_flow *flow, double dt_s);
+/** Mean velocity in the open part of a segment, m/s. @thread any (tick) */
+SONDE_API double sonde_flow_velocity(const sonde_flow *flow, sonde_flow_segment segment);
+/** Pressure in a segment above the atmosphere's, Pa, lying. @thread any (tick) */
+SONDE_API double sonde_flow_pressure(const sonde_flow *flow, sonde_flow_segment segment);
+/** Mean velocity in the common femoral artery at a share of the beat: triphasic. @thread any */
+SONDE_API double sonde_flow_artery(double beat);
+
+/* ---- profiles ----------------------------------------------------------------------------- */
+
+enum { SONDE_FLOW_RINGS = 33, SONDE_FLOW_HARMONICS = 12 };
+
+/** Parabola of a mean velocity: ring k lies at k/(SONDE_FLOW_RINGS - 1) of the radius; in an
+ * ellipse the same along every radius, which is exact. @thread any (tick) */
+SONDE_API void sonde_flow_steady(double mean_m_s, double profile_m_s[SONDE_FLOW_RINGS]);
+/**
+ * Womersley's profile of a periodic flow in a round tube.
+ * @param mean_m_s [samples] mean velocity over one period, samples >= 2 SONDE_FLOW_HARMONICS
+ * @param radius_m of the lumen; rate_hz of the beat, > 0
+ * @param phase share of the period
+ * @thread any
+ */
+SONDE_API void sonde_flow_pulsed(const double *mean_m_s, uint32_t samples, double radius_m,
+                                 double rate_hz, double phase,
+                                 double profile_m_s[SONDE_FLOW_RINGS]);
+
+/* ---- pulsed Doppler ----------------------------------------------------------------------- */
+
+enum { SONDE_DOPPLER_BINS = 128 };
+
+/** A gate on a vessel and the chain behind it. */
+typedef struct sonde_doppler_def {
+  double frequency_hz, pulse_hz; /**< carrier, 1e6 to 2e7; pulse repetition, 500 to 2e4 */
+  double angle_rad;              /**< between beam and flow towards the probe, 0 to pi */
+  double gate_m, beam_m;         /**< length of the gate; standard deviation of the beam's width */
+  double half_short_m, half_long_m; /**< of the lumen, the short one along the beam */
+  double clutter_db, noise_db;      /**< of the walls' echo and of noise, over the blood's */
+  double filter_hz;                 /**< frequencies below are removed */
+  uint64_t seed;                    /**< of scatterers and noise */
+} sonde_doppler_def;
+
+SONDE_API sonde_doppler_def sonde_doppler_def_default(void); /**< @thread any */
+
+typedef struct sonde_doppler sonde_doppler;
+/** @return ARGUMENT naming the value, MEMORY. @thread owner */
+SONDE_API sonde_status sonde_doppler_create(const sonde_doppler_def *def, sonde_doppler **doppler,
+                                            sonde_error *error);
+SONDE_API void sonde_doppler_destroy(sonde_doppler *doppler); /**< NULL is fine. @thread owner */
+/** One pulse: the scatterers move by the profile for 1/pulse_hz. @thread tick */
+SONDE_API void sonde_doppler_pulse(sonde_doppler *doppler,
+                                   const double profile_m_s[SONDE_FLOW_RINGS]);
+
+/** What the last SONDE_DOPPLER_BINS pulses hold. */
+typedef struct sonde_doppler_spectrum {
+  double
+      power[SONDE_DOPPLER_BINS]; /**< by velocity, from the lowest that is shown to the highest */
+  double velocity_m_s[SONDE_DOPPLER_BINS]; /**< corrected by the angle */
+  double mean_m_s;                         /**< power-weighted */
+  double peak_m_s; /**< edge of the spectrum away from zero, 99 % of the power below it */
+} sonde_doppler_spectrum;
+/** Hann-weighted spectrum, wall filter applied; zeros until there are as many pulses. @thread tick
+ */
+SONDE_API void sonde_doppler_read(const sonde_doppler *doppler, sonde_doppler_spectrum *spectrum);
+/** Velocity from the phase between neighbouring pulses of the same window. @thread tick */
+SONDE_API double sonde_doppler_phase_velocity(const sonde_doppler *doppler);
+/** Highest velocity that is not folded: c pulse_hz / (4 f |cos angle|). @thread any */
+SONDE_API double sonde_doppler_limit(const sonde_doppler_def *def);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,53 @@
+// Velocity profiles: a parabola, and Womersley's of a pulse (docs/flow_theory.md).
+#include "sonde/flow.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+
+#include <complex.h>
+
+static const double blood_m2_s = 3.5e-3 / 1060;
+
+void sonde_flow_steady(double mean_m_s, double profile_m_s[SONDE_FLOW_RINGS]) {
+  SONDE_ASSERT(isfinite(mean_m_s));
+  for (int k = 0; k < SONDE_FLOW_RINGS; ++k) {
+    double r = (double)k / (SONDE_FLOW_RINGS - 1);
+    profile_m_s[k] = 2 * mean_m_s * (1 - r * r);
+  }
+}
+
+// Bessel functions of the first kind, orders 0 and 1, by their series: |z| <= 20 or so.
+static void bessel(double complex z, double complex *j0, double complex *j1) {
+  double complex square = -0.25 * z * z, term = 1;
+  *j0 = *j1 = 0;
+  for (int k = 0; k < 80; ++k) {
+    *j0 += term;
+    *j1 += term / (k + 1);
+    term *= square / ((k + 1.0) * (k + 1.0));
+  }
+  *j1 *= 0.5 * z;
+}
+
+void sonde_flow_pulsed(const double *mean_m_s, uint32_t samples, double radius_m, double rate_hz,
+                       double phase, double profile_m_s[SONDE_FLOW_RINGS]) {
+  SONDE_ASSERT(mean_m_s && samples >= 2 * SONDE_FLOW_HARMONICS && radius_m > 0 && rate_hz > 0);
+  for (int h = 0; h < SONDE_FLOW_HARMONICS; ++h) {
+    // Fourier coefficient of the mean velocity, at the phase.
+    double complex c = 0;
+    for (uint32_t i = 0; i < samples; ++i)
+      c += mean_m_s[i] * cexp(-2 * SONDE_PI * I * h * ((double)i / samples - phase));
+    c *= (h ? 2.0 : 1.0) / samples;
+    if (h == 0) {
+      sonde_flow_steady(creal(c), profile_m_s);
+      continue;
+    }
+    double alpha = radius_m * sqrt(2 * SONDE_PI * rate_hz * h / blood_m2_s);
+    double complex lambda = alpha * cexp(0.75 * SONDE_PI * I), j0, j1, inner, unused;
+    bessel(lambda, &j0, &j1);
+    double complex below = j0 - 2 * j1 / lambda;
+    for (int k = 0; k < SONDE_FLOW_RINGS; ++k) {
+      bessel(lambda * k / (SONDE_FLOW_RINGS - 1), &inner, &unused);
+      profile_m_s[k] += creal(c * (j0 - inner) / below);
+    }
+  }
+}
