@@ -376,6 +376,21 @@ static void the_cases_that_ship_are_good(void **state) {
       sonde_plan plan = plan_of(&protocols[k], &setup.map);
       assert_true(plan.count >= protocols[k].stop_count);
       for (uint32_t n = 0; n < plan.count; ++n) the_place_shows_its_vein(&plan.point[n], &setup);
+      // Where the main vein of a segment has a clot, one of the segment's places lies in it.
+      for (uint32_t s = 0; s < setup.map.segment_count; ++s) {
+        const sonde_pathology *p = &setup.pathology;
+        bool asked = false, met = p->thrombus_from_m == p->thrombus_to_m;
+        for (uint32_t n = 0; n < plan.count; ++n) {
+          double z_m = plan.point[n].at.z_m;
+          if (plan.point[n].segment != s) continue;
+          asked = true, met |= z_m > p->thrombus_from_m && z_m < p->thrombus_to_m;
+        }
+        bool main = setup.map.segment[s].vein_count == 0;
+        if (main && asked &&
+            sonde_case_truth(&cases[i], setup.map.segment[s].name) == SONDE_DECISION_CLOT && !met)
+          fail_msg("%s: no place of %s meets the clot in %s", cases[i].id, protocols[k].id,
+                   setup.map.segment[s].name);
+      }
     }
     sonde_case_setup_clear(&setup);
   }
