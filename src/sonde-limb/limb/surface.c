@@ -243,6 +243,37 @@ static void recentre(double *x, double *y, double *radius) {
   }
 }
 
+// What the bones reach at a place, also in the rows and, at pelvis and patella, the angles beside.
+static double bone_reach(double (*bone)[LIMB_ANGLES], uint32_t r, uint32_t c) {
+  const double level = LIMB_TOP + r * LIMB_STEP;
+  const int aside = level < 0.15 || fabs(level - 0.95) < 0.1 || level > 1.9 ? 1 : 0;
+  double reach = 0;
+  for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
+    for (int q = -aside; q <= aside; ++q)
+      reach = most_of(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
+  return reach;
+}
+
+// Around the knee the spread push makes the girth larger where the fossa's roof begins: its
+// sections get the girth again, outside the bones.
+static void keep_girth(const sonde_limb *limb, double (*bone)[LIMB_ANGLES],
+                       double (*fascia)[LIMB_ANGLES]) {
+  const sonde_limb_body *b = &limb->body;
+  for (uint32_t r = 0; r < LIMB_ROWS; ++r) {
+    const double level = LIMB_TOP + r * LIMB_STEP;
+    const double knee = 1 - smooth_step((fabs(level - 0.93) - 0.14) / 0.08);
+    double around[LIMB_ANGLES], outside[LIMB_ANGLES], radius[LIMB_ANGLES], reach[LIMB_ANGLES],
+        mean = 0;
+    if (knee <= 0) continue;
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) mean += fascia[r][c] / LIMB_ANGLES;
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c)
+      around[c] = fascia[r][c] / mean, outside[c] = limb->surface.fat[r][c] + b->skin_m,
+      reach[c] = bone_reach(bone, r, c);
+    fit_section(around, reach, outside, girth_at(b, level), radius);
+    for (uint32_t c = 0; c < LIMB_ANGLES; ++c) fascia[r][c] += knee * (radius[c] - fascia[r][c]);
+  }
+}
+
 // The fascia of all rows: what the bones add and what the size loses by them, spread over
 // neighbouring rows, and outside every bone. `extra` is room for what the bones reach beyond that.
 static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
@@ -252,7 +283,6 @@ static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
   const limb_surface *s = &limb->surface;
   for (uint32_t r = 0; r < LIMB_ROWS; ++r)
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) {
-      const double level = LIMB_TOP + r * LIMB_STEP;
       double sum = 0, weights = 0;
       for (int k = -SPREAD; k <= SPREAD; ++k) {
         int row = (int)r + k;
@@ -260,14 +290,8 @@ static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
         double w = SPREAD + 1 - abs(k);
         sum += w * (pushed[row][c] - s->fascia[row][c]), weights += w;
       }
-      // Also what reaches the rows and, at pelvis and patella, the angles beside.
-      double reach = 0;
-      int aside = level < 0.15 || fabs(level - 0.95) < 0.1 || level > 1.9 ? 1 : 0;
-      for (int k = r > 0 ? -1 : 0; k <= (r + 1 < LIMB_ROWS ? 1 : 0); ++k)
-        for (int q = -aside; q <= aside; ++q)
-          reach = most_of(reach, bone[(int)r + k][((int)c + q + LIMB_ANGLES) % LIMB_ANGLES]);
       fascia[r][c] = s->fascia[r][c] + sum / weights;
-      extra[r][c] = most_of(reach - fascia[r][c], 0);
+      extra[r][c] = most_of(bone_reach(bone, r, c) - fascia[r][c], 0);
     }
   // Above the thigh the fascia leaves a bone gently along the limb: what it stands forward over the
   // ramus ends 60 mm away, with a radius of curvature of 100 mm for 6 mm of height.
@@ -305,6 +329,7 @@ static void spread_push(const sonde_limb *limb, double (*pushed)[LIMB_ANGLES],
     }
     for (uint32_t c = 0; c < LIMB_ANGLES; ++c) fascia[r][c] += share * (hull[c] - fascia[r][c]);
   }
+  keep_girth(limb, bone, fascia);
 }
 
 sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
@@ -360,7 +385,7 @@ sonde_status limb_surface_make(sonde_limb *limb, sonde_error *error) {
         double angle = 2 * SONDE_PI * c / LIMB_ANGLES;
         // The farthest bone on the ray, with some tissue over it; behind the knee with room for the
         // vessels and the nerve between the condyles and the roof of the popliteal fossa.
-        const double fossa = (1 - smooth_step((fabs(level - 0.95) - 0.06) / 0.1)) *
+        const double fossa = (1 - smooth_step((fabs(level - 0.955) - 0.04) / 0.08)) *
                              (1 - smooth_step((fabs(angle - SONDE_PI) - 0.35) / 0.6));
         const double over = (level < 0.15 ? 0.003 : 0.0012) + FOSSA_M * limb->scale * fossa;
         double reach = 1.5 * s->fascia[r][c], least = 0.2 * reach, gap = 1;
