@@ -25,6 +25,7 @@ typedef struct options {
 } options;
 
 static const options DEFAULTS = {.port = 8642,
+                                 .scanner = "venous",
                                  .seconds = 10.0,
                                  .probe = "linear",
                                  .pathology = "healthy",
@@ -50,7 +51,7 @@ static const app_option TABLE[] = {
     OPT_TEXT(compare, "compare", "FILE",
              "a second preset, which the controls of the page can change over to"),
     OPT_TEXT(scanner, "scanner", "NAME|FILE",
-             "a scanner that ships (sonde scanner list) or a file; default plain"),
+             "a scanner that ships (sonde scanner list) or a file; default venous"),
     OPT_REAL(gel_m3, "gel-ml", "V", 0, 1000, 1e-6,
              "gel spread over the sites at the start; 0: dry skin"),
     OPT_FLAG(no_gel, "no-gel", "no gel is simulated: every line of the image is coupled"),

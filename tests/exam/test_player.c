@@ -2,6 +2,7 @@
 // played through, with and without keyframes, also of what a killed program left.
 #include "exam/player.h"
 #include "exam_test.h"
+#include "sonde/files_scanner.h"
 
 #include "base/clock.h"
 
@@ -50,8 +51,11 @@ static void change_controls(sonde_session *session, uint64_t tick) {
   if (tick == 330 || tick == 500 || tick == 610 || tick == 800) sonde_session_control(session, &c);
 }
 
+static const sonde_scanner *scanner; // of the recorded session; NULL: the plain one
+
 static void record(const sonde_model *model, uint64_t ticks, seen *s) {
   sonde_session_def def = small_def(model);
+  def.scanner = scanner;
   def.record_path = path;
   def.controls.echo.depth_m = 0.05;
   sonde_session *session = open_session(&def, press_device());
@@ -103,6 +107,35 @@ static void played_through_it_shows_the_same(void **state) {
   assert_int_equal(sonde_player_check(player, true, NULL, &result, NULL), SONDE_OK);
   assert_true(result.same && result.same_images && result.checks == 3);
   assert_true(result.images == 50 && result.different_tick == 0);
+  sonde_player_close(player);
+}
+
+// Live pictures of a scanner hold looks of those before: played through they are the same. After a
+// seek the next picture has all looks at once, wherever the player was before.
+static void a_scanner_is_played_again(void **state) {
+  static seen s;
+  sonde_scanner three = sonde_scanner_plain();
+  three.looks = 3, three.look_rad = 0.15, three.persistence = 0.4, three.filter = 0.3;
+  scanner = &three;
+  record(*state, 600, &s);
+  scanner = NULL;
+  sonde_player *player = open_player(*state, false, true);
+  for (uint32_t i = 0; i < s.count; ++i) {
+    assert_true(sonde_player_next_image(player, true));
+    same_frame(player, &s, i);
+  }
+  sonde_replay_result result;
+  assert_int_equal(sonde_player_check(player, true, NULL, &result, NULL), SONDE_OK);
+  assert_true(result.same && result.same_images && result.images == s.count);
+  uint64_t hash[2];
+  for (int k = 0; k < 2; ++k) {
+    sonde_frame frame;
+    assert_int_equal(sonde_player_seek(player, k ? 0.58 : 0.1, NULL, NULL), SONDE_OK);
+    assert_int_equal(sonde_player_seek(player, 0.4, NULL, NULL), SONDE_OK);
+    assert_true(sonde_player_frame(player, &frame));
+    hash[k] = sonde_hash(0, frame.pixels, (size_t)frame.width * frame.height);
+  }
+  assert_true(hash[0] == hash[1]);
   sonde_player_close(player);
 }
 
@@ -368,6 +401,7 @@ static void comments_are_kept_in_order(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(played_through_it_shows_the_same),
+      cmocka_unit_test(a_scanner_is_played_again),
       cmocka_unit_test(any_moment_is_that_of_playing_through),
       cmocka_unit_test(keyframes_are_a_cache),
       cmocka_unit_test(a_realtime_session_shows_the_same_again),

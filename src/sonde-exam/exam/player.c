@@ -3,6 +3,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "echo/live.h"
 
 #include <string.h>
 
@@ -83,6 +84,7 @@ void sonde_player_restart(sonde_player *player) {
                                 player->start_world, player->start_bytes, NULL);
   SONDE_ASSERT(status == SONDE_OK);
   place(player, 0);
+  if (s->echo) sonde_echo_begin_looks(s->echo);
   player->followed = player->drawn = false;
 }
 
@@ -241,6 +243,8 @@ sonde_status sonde_player_seek(sonde_player *player, double time_s, const sonde_
     here = false;
   }
   if (!here && !jumped) sonde_player_restart(player);
+  // Wherever the player was before, the next image is one of all looks.
+  if (player->session->echo) sonde_echo_begin_looks(player->session->echo);
   make_image(player);
   uint64_t start = tick_of(player);
   for (uint64_t tick = start; tick < goal && tick_once(player); ++tick) {

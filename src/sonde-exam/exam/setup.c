@@ -3,6 +3,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "sonde/files_scanner.h"
 
 #include <string.h>
 
@@ -18,7 +19,9 @@ sonde_setup sonde_setup_of(const sonde_session_def *def) {
                        .preset_count = def->preset_count,
                        .gel_m3 = def->gel_m3,
                        .circulate = def->circulate,
-                       .circulation = def->circulation};
+                       .circulation = def->circulation,
+                       .scans = def->scanner != NULL};
+  if (def->scanner) setup.scanner = *def->scanner;
   memcpy(setup.presets, def->presets, sizeof setup.presets);
   return setup;
 }
@@ -31,6 +34,7 @@ void sonde_setup_apply(const sonde_setup *setup, sonde_session_def *def) {
   def->gel_m3 = setup->gel_m3;
   def->circulate = setup->circulate;
   def->circulation = setup->circulation;
+  def->scanner = setup->scans ? &setup->scanner : NULL;
 }
 
 // A number by name. NaN and infinity have no JSON: they are left out, and read as NaN.
@@ -101,7 +105,41 @@ void sonde_setup_write(sonde_json_out *header, const sonde_setup *setup) {
     write_list(header, list, list_circulation(list, &s.circulation));
     sonde_json_end(header);
   }
+  if (s.scans) {
+    uint32_t count;
+    const sonde_scanner_number *item = sonde_scanner_numbers(&count);
+    sonde_json_begin_object(header, "scanner");
+    for (uint32_t i = 0; i < count; ++i)
+      sonde_json_put_real(header, item[i].key,
+                          *(const double *)((const char *)&s.scanner + item[i].offset), 17);
+    sonde_json_begin_list(header, "slider_db");
+    for (uint32_t k = 0; k < SONDE_SCANNER_SLIDERS; ++k)
+      sonde_json_put_real(header, NULL, s.scanner.slider_db[k], 17);
+    sonde_json_end(header);
+    sonde_json_end(header);
+  }
   sonde_json_end(header);
+}
+
+// Numbers as the scanner holds them, SI; false where one is missing or beyond its limits.
+static bool read_scanner(const sonde_json *object, sonde_scanner *scanner) {
+  uint32_t count, k = 0;
+  const sonde_scanner_number *item = sonde_scanner_numbers(&count);
+  *scanner = sonde_scanner_plain();
+  for (uint32_t i = 0; i < count; ++i) {
+    double value = sonde_json_as_number(sonde_json_member(object, item[i].key));
+    const double slack = 1e-9 * fabs(item[i].high * item[i].si);
+    if (!(value >= item[i].low * item[i].si - slack && value <= item[i].high * item[i].si + slack))
+      return false;
+    *(double *)((char *)scanner + item[i].offset) = value;
+  }
+  const sonde_json *list = sonde_json_member(object, "slider_db");
+  for (list = sonde_json_first(list); list && k < SONDE_SCANNER_SLIDERS;
+       list = sonde_json_next(list)) {
+    scanner->slider_db[k] = sonde_json_as_number(list);
+    if (!isfinite(scanner->slider_db[k++])) return false;
+  }
+  return k == SONDE_SCANNER_SLIDERS;
 }
 
 bool sonde_setup_read(const sonde_json *header, sonde_setup *setup) {
@@ -124,6 +162,9 @@ bool sonde_setup_read(const sonde_json *header, sonde_setup *setup) {
     read_list(item, list, list_preset(list, preset));
     if (sonde_preset_apply(preset, NULL, NULL, NULL)) return false;
   }
+  const sonde_json *scanner = sonde_json_member(object, "scanner");
+  setup->scans = scanner != NULL;
+  if (scanner && !read_scanner(scanner, &setup->scanner)) return false;
   const sonde_json *circulation = sonde_json_member(object, "circulation");
   if (!circulation) return true;
   double posture = sonde_json_as_number(sonde_json_member(circulation, "posture"));

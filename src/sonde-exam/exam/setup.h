@@ -3,6 +3,7 @@
 #define SONDE_SRC_SETUP_H
 
 #include "sonde/base_json.h"
+#include "sonde/echo_scanner.h"
 #include "sonde/exam.h"
 
 // What holds for a whole session.
@@ -13,11 +14,13 @@ typedef struct sonde_setup {
   double gel_m3;
   bool circulate;
   sonde_circulation circulation;
+  bool scans; // the scanner below makes the pictures, else the plain one
+  sonde_scanner scanner;
 } sonde_setup;
 
 sonde_setup sonde_setup_default(void);
 sonde_setup sonde_setup_of(const sonde_session_def *def);
-// Into the definition of a session that is to start alike.
+// Into the definition of a session that is to start alike; `def` borrows the scanner of `setup`.
 void sonde_setup_apply(const sonde_setup *setup, sonde_session_def *def);
 // Adds "setup" to the header of a recording. @thread owner
 void sonde_setup_write(sonde_json_out *header, const sonde_setup *setup);

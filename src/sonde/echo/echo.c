@@ -1,6 +1,7 @@
 // Life of a renderer, the operator's settings.
 #include "base/base.h"
 #include "base/vector.h"
+#include "echo/live.h"
 #include "echo/cubes.h"
 #include "echo/echo.h"
 #include "echo/bands.h"
@@ -279,6 +280,12 @@ sonde_status sonde_echo_set_kernels(sonde_echo *echo, const char *name, sonde_er
   echo->kernels = found;
   forget_textures(echo);
   return SONDE_OK;
+}
+
+void sonde_echo_begin_looks(sonde_echo *echo) {
+  SONDE_ASSERT(echo != NULL);
+  echo->drawn_looks = 0;
+  echo->is_held = false;
 }
 
 const char *sonde_echo_kernels(const sonde_echo *echo) {
