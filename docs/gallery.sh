@@ -46,6 +46,26 @@ set -- "$models/more" --site 22 --depth-mm 50 --case chronic --webs 1
 shoot webs "$@"
 shoot webs_pressed "$@" --force-n 8
 
+# Standard views of a limb; its first sites are the stations.
+"$sonde" limb --seed 3 --sex female --bmi 24 --model "$models/leg.sonde" >"$models/table"
+view() {
+  name=$1 station=$2 depth=$3
+  shift 3
+  shoot "view_$name" "$models/leg.sonde" --site "$station" --depth-mm "$depth" "$@"
+}
+view groin 1 50 --force-n 1
+view saphenous 2 50 --force-n 1
+view confluence 3 50 --force-n 1
+view thigh 5 60 --force-n 2
+view thigh_pressed 5 60 --force-n 12
+view knee 8 50 --force-n 4
+view knee_along 8 50 --turn-deg 90 --force-n 4
+view tibial 10 50 --force-n 2
+view gastrocnemius 12 50 --force-n 2
+view thigh_bright 5 60 --force-n 2 --scanner bright
+view thigh_compact 5 60 --force-n 2 --scanner compact
+view thigh_plain 5 60 --force-n 2 --scanner plain
+
 # Sections of a whole limb.
 "$sonde" limb --seed 3 --levels 0.15,0.5,1.5 --atlas "$models/limb" >"$models/table"
 for level in 0.15 0.50 1.50; do cp "$models/limb/section_+$level.svg" "$out/limb_$level.svg"; done
