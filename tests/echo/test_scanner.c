@@ -1,4 +1,5 @@
 // The scanner's chain: looks, display, live pictures.
+#include "base/random.h"
 #include "echo/bench.h"
 #include "echo/echo.h"
 
@@ -280,6 +281,143 @@ static void filter_keeps_an_edge(void **state) {
   bench_clear(&b);
 }
 
+// Slanted lines of 12 dB every 2 mm under speckle.
+static float slanted_lines(double x, double z, uint32_t number) {
+  const double phase = (z - 0.2 * x) / 2e-3 - floor((z - 0.2 * x) / 2e-3);
+  const double speckle = sqrt(-2 * log(sonde_random_uniform(7, number) + 1e-9));
+  return (float)(pow(10, (phase < 0.3 ? 12 : 0) / 20.0) * speckle);
+}
+
+// Smoothing follows the lines: grey values along one differ less, lines and what lies between them
+// stay as far apart.
+static void filter_smooths_along_lines(void **state) {
+  (void)state;
+  static bench b;
+  bench_create(&b, 0.08, 0.01, 0, true, false);
+  sonde_scanner s = full_scanner();
+  double rough[2], contrast[2];
+  for (int k = 0; k < 2; ++k) {
+    s.looks = 1, s.filter = k ? 0.8 : 0, s.haze_db = -89, s.white_db = 30;
+    set_scanner(&b, &s, true, false);
+    look(&b, NULL);
+    display(&b, slanted_lines);
+    double sum[2] = {0}, square[2] = {0}, n[2] = {0};
+    for (uint32_t i = 300; i < 700; ++i)
+      for (uint32_t l = 20; l < b.echo->lines - 20; ++l) {
+        const double x = (l - 0.5 * b.echo->lines) * b.echo->frame.pitch_m;
+        const double line = (i * b.echo->frame.step_m - 0.2 * x) / 2e-3, at = line - floor(line);
+        const int which = at > 0.05 && at < 0.25 ? 1 : at > 0.5 && at < 0.8 ? 0 : -1;
+        if (which < 0) continue;
+        const double grey = (double)b.echo->grey[(size_t)i * b.echo->padded + l];
+        sum[which] += grey, square[which] += grey * grey, n[which] += 1;
+      }
+    contrast[k] = sum[1] / n[1] - sum[0] / n[0];
+    rough[k] = sqrt(square[1] / n[1] - sum[1] / n[1] * sum[1] / n[1]);
+  }
+  print_message("lines %.1f grey levels over what lies between, smoothed %.1f; deviation along "
+                "them %.1f, smoothed %.1f\n",
+                contrast[0], contrast[1], rough[0], rough[1]);
+  assert_within(contrast[1] / contrast[0], 0.95, 1.05);
+  assert_within(rough[1] / rough[0], 0.4, 0.65);
+  bench_clear(&b);
+}
+
+static float even_decibels;
+
+static float even(double x, double z, uint32_t number) {
+  (void)x, (void)z, (void)number;
+  return (float)pow(10, even_decibels / 20);
+}
+
+// A live picture keeps its share of what was before where little changes, and follows at once where
+// much does.
+static void persistence_keeps_small_changes(void **state) {
+  (void)state;
+  static bench b;
+  bench_create(&b, 0.08, 0.01, 0, true, false);
+  sonde_scanner s = full_scanner();
+  s.looks = 1, s.persistence = 0.6, s.white_db = 40;
+  set_scanner(&b, &s, true, true);
+  look(&b, NULL);
+  const double per_db = 255 / b.settings.dynamic_range_db;
+  const float *grey = b.echo->grey + (size_t)500 * b.echo->padded + 90;
+  double shown[4];
+  for (int k = 0; k < 3; ++k) {
+    // Fresh, 10 grey levels brighter, then the same once more.
+    b.echo->is_held = k > 0;
+    even_decibels = (float)(k ? 10 / per_db : 0);
+    display(&b, even);
+    shown[k] = (double)*grey;
+  }
+  even_decibels = (float)(100 / per_db);
+  display(&b, even);
+  shown[3] = (double)*grey;
+  print_message("grey %.1f, %.1f, %.1f, %.1f\n", shown[0], shown[1], shown[2], shown[3]);
+  assert_within(shown[1] - shown[0], 3.9, 4.1);
+  assert_within(shown[2] - shown[0], 6.3, 6.5);
+  assert_within(shown[3] - shown[0], 99.8, 100.2);
+  bench_clear(&b);
+}
+
+// Sum of the sheets on a column within half a sample of a depth, without the carrier's phase there.
+static void sheet_at(const bench *b, uint32_t column, double depth_m, double *re, double *im) {
+  const frame *f = &b->echo->frame;
+  const double row = depth_m / f->step_m + b->echo->pad_samples;
+  const double angle = 4 * SONDE_PI / f->wavelength_m * depth_m;
+  double sum[2] = {0};
+  for (int side = -1; side <= 1; ++side) {
+    const uint32_t n = (uint32_t)(row + 0.5) + (uint32_t)(side + 1) - 1;
+    for (int32_t k = b->echo->first_sheet[n]; k >= 0; k = b->echo->sheet[k].next) {
+      const sheet_point *p = &b->echo->sheet[k];
+      if (p->column != column || fabs(n + (double)p->beyond - row) > 0.01) continue;
+      sum[0] += (double)p->re, sum[1] += (double)p->im;
+    }
+  }
+  *re = sum[0] * cos(angle) - sum[1] * sin(angle);
+  *im = sum[0] * sin(angle) + sum[1] * cos(angle);
+}
+
+// The face sends an interface's echo back once more: it appears again at twice its depth, by the
+// face's level times its own, in phase with its way; also behind interfaces that lie where others
+// have their ghosts.
+static void interfaces_have_ghosts(void **state) {
+  (void)state;
+  static bench b;
+  bench_create(&b, 0.08, 0.01, 0, true, false);
+  sonde_scanner s = full_scanner();
+  s.looks = 1, s.ghost_db = -14;
+  set_scanner(&b, &s, true, false);
+  look(&b, NULL);
+  const double depth[3] = {8e-3, 16e-3, 24.3e-3}, level_db[3] = {30, 24, 36}, mirror_db = 50;
+  const uint32_t line = 90, column = b.echo->pad_lines + SONDE_FINE * line;
+  // The deepest comes first into its list.
+  sonde_sheet_begin(b.echo);
+  for (int k = 2; k >= 0; --k)
+    sonde_sheet_add(b.echo, line, (float)depth[k], 0, amplitude_of_db((float)level_db[k]));
+  sonde_echo_ghosts(b.echo);
+  for (int k = 0; k < 3; ++k) {
+    double re, im;
+    sheet_at(&b, column, 2 * depth[k], &re, &im);
+    // What lies at 16 mm itself is no ghost.
+    if (k == 0) re -= pow(10, level_db[1] / 20);
+    const double expected = pow(10, (2 * level_db[k] + s.ghost_db - mirror_db) / 20);
+    print_message("ghost of %.1f mm: %.3f + %.3f i, expected %.3f\n", 1e3 * depth[k], re, im,
+                  expected);
+    assert_within(hypot(re, im), 0.95 * expected, 1.05 * expected);
+    assert_true(re > 0.9 * expected);
+  }
+  // None without a face that reflects.
+  s.ghost_db = -90;
+  set_scanner(&b, &s, true, false);
+  look(&b, NULL);
+  sonde_sheet_begin(b.echo);
+  sonde_sheet_add(b.echo, line, 8e-3f, 0, 30);
+  const uint32_t count = b.echo->sheet_count;
+  sonde_echo_ghosts(b.echo);
+  assert_int_equal(b.echo->sheet_count, count);
+  bench_clear(&b);
+}
+
 // What no scanner can be is refused by name.
 static void absurd_scanners_are_refused(void **state) {
   (void)state;
@@ -308,6 +446,9 @@ int main(void) {
       cmocka_unit_test(kernels_agree_on_a_full_scanner),
       cmocka_unit_test(sliders_and_ceiling_shape_the_compensation),
       cmocka_unit_test(filter_keeps_an_edge),
+      cmocka_unit_test(filter_smooths_along_lines),
+      cmocka_unit_test(persistence_keeps_small_changes),
+      cmocka_unit_test(interfaces_have_ghosts),
       cmocka_unit_test(absurd_scanners_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

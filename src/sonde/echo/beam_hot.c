@@ -74,8 +74,8 @@ void sonde_echo_ghosts(sonde_echo *echo) {
   const float share = amplitude_of_db((float)f->scanner->ghost_db - mirror_db);
   const uint32_t count = echo->sheet_count;
   for (uint32_t row = 0; 2 * row < echo->grid_samples + echo->pad_samples; ++row)
-    for (int32_t k = echo->first_sheet[row]; k >= 0 && (uint32_t)k < count;
-         k = echo->sheet[k].next) {
+    for (int32_t k = echo->first_sheet[row]; k >= 0; k = echo->sheet[k].next) {
+      if ((uint32_t)k >= count) continue; // a ghost itself
       // Twice as deep is the phase twice as far, the way twice as lossy.
       const sheet_point p = echo->sheet[k];
       const float at = 2 * ((float)row - (float)echo->pad_samples + p.beyond);
