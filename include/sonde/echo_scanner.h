@@ -20,6 +20,7 @@ typedef struct sonde_scanner {
   double radius_m;              /**< of a curved face; 0: flat */
   double transmit_f, receive_f; /**< focal depth over aperture */
   double pulse_wavelengths;     /**< envelope of the echo between half values, along depth */
+  double sound_speeds;          /**< 1: tissues have their own speeds of sound; 0: 1540 m/s */
   double looks;                 /**< 1 to SONDE_MOST_LOOKS angles whose envelopes are averaged */
   double look_rad;              /**< from the middle look to the outermost */
   double noise_db;        /**< receiver's noise over muscle at the skin, before compensation */

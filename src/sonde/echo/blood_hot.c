@@ -6,6 +6,7 @@
 // segment.
 #include "base/base.h"
 #include "echo/bands.h"
+#include "echo/sound.h"
 #include "interior/vessels.h"
 
 enum { PULSE_STEPS = 64 };
@@ -50,6 +51,7 @@ static double map_segment(const sonde_echo *echo, const sonde_vessel_state *low,
     for (int c = 0; c < 3; ++c) out->m[k][c] = (float)(v_coordinate(at[k], c) * unit[c]);
   out->m[0][2] += (float)echo->pad_samples;
   out->m[0][3] = sqrtf(1 - sonde_clutter(echo) * sonde_clutter(echo));
+  if (sonde_sound_on(echo)) sonde_sound_move(echo, out);
   const float beside = 0.5f * (fabsf(out->m[1][1]) + fabsf(out->m[2][1]) + fabsf(out->m[3][1]));
   return fabsf(out->m[0][1]) <= 1 + beside ? SONDE_PI * half_short * half_long * length : 0;
 }

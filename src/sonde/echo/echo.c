@@ -5,6 +5,7 @@
 #include "echo/cubes.h"
 #include "echo/echo.h"
 #include "echo/bands.h"
+#include "echo/sound.h"
 #include "interior/fields.h"
 
 #include <stddef.h>
@@ -124,6 +125,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->cubes, 1);
   CARVE(echo->bands, 1);
   CARVE(echo->motion, 1);
+  CARVE(echo->sound, 1);
   used = carve_pool(&echo->pool, block, used, 2 * SONDE_POOL + SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
 }

@@ -45,7 +45,8 @@ typedef struct frame {
   sonde_pose probe;
   sonde_mat3 from_world;                       // rotation world -> probe
   double aperture_m, depth_m, pitch_m, step_m; // line pitch at the face, sample step
-  double radius_m;                             // of a curved face, else 0
+  double reach_m;  // depth down to which tissue is drawn: fast tissue shows what lies deeper
+  double radius_m; // of a curved face, else 0
   double frequency_hz, wavelength_m, focus_m;
   double first_line, edge_lines; // line at x = 0; lines beyond the outer ones that matter
   const sonde_pathology *pathology;
@@ -137,6 +138,7 @@ struct sonde_echo {
   float *loss_db;                // [padded] accumulated
   float *tail;                   // [padded] power that reverberates, kernel.h
   uint8_t *air;                  // [padded]
+  struct sonde_sound *sound;     // sound.h
   bool some_air;
   float *gain; // [MEDIUM_ROWS][gain_stride] of the grid's even columns: beside the outer lines
                // those go on

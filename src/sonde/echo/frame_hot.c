@@ -61,6 +61,7 @@ void sonde_echo_geometry(sonde_echo *echo, double aperture_m, const sonde_echo_s
   frame *f = &echo->frame;
   f->aperture_m = aperture_m;
   f->depth_m = s.depth_m;
+  f->reach_m = s.depth_m * (1 + 0.03 * echo->scanner.sound_speeds);
   f->pitch_m = aperture_m / (echo->lines - 1);
   f->step_m = s.depth_m / (echo->samples - 1);
   f->frequency_hz = s.frequency_hz;
@@ -131,8 +132,8 @@ void sonde_echo_frame(sonde_echo *echo, sonde_pose world_from_probe, double aper
   // The coarse plane.
   f->edge_lines = (double)echo->pad_lines / SONDE_FINE;
   echo->lines_per_column = (echo->lines - 1 + 2 * f->edge_lines) / (SONDE_PLANE_COLUMNS - 1);
-  echo->plane_rows = (uint32_t)clamp(ceil(f->depth_m / row_m) + 1, fewest_rows, SONDE_PLANE_ROWS);
-  echo->depth_per_row = f->depth_m / (echo->plane_rows - 1);
+  echo->plane_rows = (uint32_t)clamp(ceil(f->reach_m / row_m) + 1, fewest_rows, SONDE_PLANE_ROWS);
+  echo->depth_per_row = f->reach_m / (echo->plane_rows - 1);
   // The slab's height, and how many times more scatterers a resolution cell holds than it needs, as
   // a logarithm of base two. A cell's extent along each axis is (sum p)^2 / sum p^2 of the
   // intensity: 1.0645 half widths of a Gaussian pulse, 1.4 half heights of the elevation's

@@ -6,6 +6,7 @@
 #include "base/base.h"
 #include "echo/bands.h"
 #include "echo/cubes.h"
+#include "echo/sound.h"
 
 // Image coordinates of four points that walls moved.
 static void image_points(const sonde_echo *echo, uint32_t group, float_x4 at[4]) {
@@ -37,6 +38,7 @@ static bool make_map(const sonde_echo *echo, float_x4 origin, const float_x4 axi
   if (fabsf(first[1]) > 1 + reach) return false;
   vstore(one->m[0], first), one->m[0][3] = 1;
   for (int k = 0; k < 3; ++k) vstore(one->m[k + 1], m[k]);
+  if (sonde_sound_on(echo)) sonde_sound_move(echo, one);
   one->from = from, one->count = count, one->lumen = echo->bands->lumens, one->lumens = 0;
   return true;
 }

@@ -3,7 +3,7 @@
 // docs/echo.md.
 #include "base/base.h"
 #include "base/random.h"
-#include "echo/echo.h"
+#include "echo/sound.h"
 #include "sonde/tissue_anatomy.h"
 
 #include <string.h>
@@ -88,12 +88,24 @@ static bool is_hidden(const sonde_echo *echo, const float *now, uint32_t l, uint
   return false;
 }
 
+// A sheet that a line crosses a share of the way from the last row to this one, and so much deeper
+// on each column to the right.
+static void lay(sonde_echo *echo, uint32_t line, uint32_t row, float share, float rise_m,
+                float amplitude) {
+  float depth_m = ((float)row - 1 + share) * (float)(echo->frame.reach_m / (SONDE_MEDIUM_ROWS - 1));
+  if (sonde_sound_on(echo)) {
+    depth_m = sonde_sound_depth(echo, line, share, &rise_m);
+    amplitude *= sqrtf(echo->sound->spread[line]);
+  }
+  sonde_sheet_add(echo, line, depth_m, rise_m, amplitude);
+}
+
 // A level that changes sign between the last row and this one is an interface, which reflects.
 static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crossed) {
   const uint32_t n = echo->padded, edges = LAYER_LEVELS + echo->shown_count;
   const sonde_lesion *lesion = echo->interior->findings.lesion;
   const float *now = echo->level[row % 2], *before = echo->level[(row + 1) % 2];
-  const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  const float dz = (float)(echo->frame.reach_m / (SONDE_MEDIUM_ROWS - 1));
   // The sheets: which level they lie at, and how far beyond its change of sign.
   struct {
     uint32_t level, sheet;
@@ -152,8 +164,10 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
         rough += (float)sheet[i].sheet * next_sheet_db;
       }
       float amplitude = echo->coupling[l] * amplitude_of_db(kind->db + rough - echo->loss_db[l]);
-      sonde_sheet_add(echo, l, ((float)row - 1 + t) * dz, rise, amplitude);
+      lay(echo, l, row, t, rise, amplitude);
       echo->loss_db[l] += kind->loss_db;
+      if (sonde_sound_on(echo))
+        echo->loss_db[l] += sonde_sound_passage_db(echo, which, fabsf(slope));
       if (which == CORTEX)
         echo->rough[l] *= amplitude_of_db(kind->loss_db); // facets lie above the loss
     }
@@ -164,7 +178,7 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
 static void add_septa(sonde_echo *echo, uint32_t row) {
   const float *now = echo->septum[row % 2], *before = echo->septum[(row + 1) % 2];
   const float *size = echo->septum[2];
-  const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  const float dz = (float)(echo->frame.reach_m / (SONDE_MEDIUM_ROWS - 1));
   const uint32_t n = echo->padded, edges = LAYER_LEVELS + echo->shown_count;
   for (uint32_t l = 0; l < echo->lines; ++l) {
     const float last = before[l], here = now[l], step = here - last;
@@ -181,7 +195,7 @@ static void add_septa(sonde_echo *echo, uint32_t row) {
     const float rise = -across / (SONDE_FINE * (fabsf(slope) > 1e-6f ? slope : 1e-6f));
     const float amplitude =
         echo->coupling[l] * size[l] * amplitude_of_db(septum_db - echo->loss_db[l]);
-    sonde_sheet_add(echo, l, ((float)row - 1 + last / (last - here)) * dz, rise, amplitude);
+    lay(echo, l, row, last / (last - here), rise, amplitude);
   }
 }
 
@@ -207,24 +221,30 @@ static void blur(const sonde_echo *echo, float *value) {
 
 // Beside the outer lines those go on.
 static void store_gain(sonde_echo *echo, uint32_t row) {
-  float *gain = echo->gain + (size_t)row * echo->gain_stride;
+  const bool own_speeds = sonde_sound_on(echo);
   const uint32_t first = echo->pad_lines / SONDE_FINE, last = first + echo->lines - 1;
+  float *gain = echo->gain + (size_t)row * echo->gain_stride;
   SONDE_ASSERT(first + echo->padded <= echo->gain_stride);
-  const float dz = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  const float dz = (float)(echo->frame.reach_m / (SONDE_MEDIUM_ROWS - 1));
   const fade_job job = {
       .scatter = echo->scatter,
       .rough = echo->rough,
       .loss_db = echo->loss_db,
       .tail = echo->tail,
-      .gain = gain + first,
+      .gain = own_speeds ? echo->sound->gain[row % 2] : gain + first,
       .clutter = echo->plain ? 0 : clutter_power,
       .fresh = 1 - expf(-dz / clutter_m),
       .kept =
           expf(-0.2302585f * dz * (float)sonde_echo_default_tgc_db_per_m(echo->frame.frequency_hz)),
       .lines = echo->padded};
   echo->kernels->fade(&job);
-  for (uint32_t l = 0; l < first; ++l) gain[l] = gain[first];
-  for (uint32_t l = last + 1; l < echo->gain_stride; ++l) gain[l] = gain[last];
+  const bool drawn = row + 1 == SONDE_MEDIUM_ROWS;
+  if (own_speeds) sonde_sound_draw_gain(echo, row);
+  for (uint32_t k = own_speeds ? 0 : row; k <= row && (drawn || !own_speeds); ++k) {
+    gain = echo->gain + (size_t)k * echo->gain_stride;
+    for (uint32_t l = 0; l < first; ++l) gain[l] = gain[first];
+    for (uint32_t l = last + 1; l < echo->gain_stride; ++l) gain[l] = gain[last];
+  }
 }
 
 // What a model's tissue map has in view: bodies and muscles.
@@ -310,7 +330,7 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
   // Facets of the cortex lie thinner than the pulse is long, which they fill only in part. The
   // energy of a tent is two thirds of its height's over its half width; that of the pulse is 0.83
   // wavelengths of its peak's.
-  const float row_m = (float)(echo->frame.depth_m / (SONDE_MEDIUM_ROWS - 1));
+  const float row_m = (float)(echo->frame.reach_m / (SONDE_MEDIUM_ROWS - 1));
   job->rough_m = fmaxf(rough_m, row_m);
   float filled = 0.83f * (float)echo->frame.wavelength_m / (job->rough_m * 2 / 3);
   job->rough_bone = echo->plain ? 0 : rough_share * amplitude_of_db(interfaces[CORTEX].db);
@@ -318,11 +338,34 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
   job->periosteum = echo->plain ? 0 : amplitude_of_db(periosteum_db);
 }
 
+// Fields of a row of the march, per line: between two coarse rows, which are widened to the lines
+// when the march reaches them; to rays that bend as they are there, on to where they lead.
+static void find_fields(sonde_echo *echo, uint32_t row, uint32_t *reached) {
+  const uint32_t last = echo->plane_rows - 2, size = echo->fields * echo->padded;
+  const float y = (float)(row * (last + 1)) / (SONDE_MEDIUM_ROWS - 1);
+  const uint32_t j = (uint32_t)y < last ? (uint32_t)y : last;
+  const bool own_speeds = sonde_sound_on(echo);
+  widen_job widen = {.column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
+  SONDE_ASSERT(*reached <= j + 2);
+  if (own_speeds && *reached < j + 2) *reached = j;
+  for (; *reached < j + 2; ++*reached) {
+    if (own_speeds)
+      sonde_sound_aim(echo, ((float)*reached - y) * (SONDE_MEDIUM_ROWS - 1) / (float)(last + 1));
+    for (uint32_t field = 0; field < echo->fields; ++field) {
+      widen.in = echo->plane + field * SONDE_PLANE_NODES + *reached * SONDE_PLANE_COLUMNS;
+      widen.out = echo->wide + *reached % 2 * size + field * echo->padded;
+      echo->kernels->widen(&widen);
+    }
+  }
+  echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
+                     echo->row, size);
+}
+
 void sonde_echo_medium(sonde_echo *echo) {
   const frame *f = &echo->frame;
   SONDE_ASSERT(f->pathology != NULL && echo->padded % ECHO_ALIGN == 0);
   uint32_t lines = echo->padded, reached = 0;
-  float step = (float)(2 * f->depth_m / (SONDE_MEDIUM_ROWS - 1) * f->frequency_hz * 1e-6);
+  float step = (float)(2 * f->reach_m / (SONDE_MEDIUM_ROWS - 1) * f->frequency_hz * 1e-6);
   uint8_t crossed[SONDE_MOST_LINES / ECHO_ALIGN];
   tissue_job job = {.row = echo->row,
                     .lines = lines,
@@ -340,33 +383,14 @@ void sonde_echo_medium(sonde_echo *echo) {
   memset(echo->tail, 0, lines * sizeof *echo->tail);
   sonde_sheet_begin(echo);
   echo->some_air = false;
-  // Each line lies between two columns of the coarse plane.
-  for (uint32_t l = 0; l < lines; ++l) {
-    uint32_t line = l < echo->lines ? l : echo->lines - 1;
-    float x = ((float)f->edge_lines + (float)line) * (float)(1 / echo->lines_per_column);
-    uint32_t i = (uint32_t)x < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)x : SONDE_PLANE_COLUMNS - 2;
-    echo->line_column[l] = (int32_t)i, echo->line_share[l] = x - (float)i;
-  }
+  sonde_sound_begin(echo);
+  sonde_sound_aim(echo, 0);
   for (uint32_t row = 0; row < SONDE_MEDIUM_ROWS; ++row) {
-    // Fields of a row of the march, per line: between two coarse rows, which are widened to the
-    // lines when the march reaches them.
-    const uint32_t last = echo->plane_rows - 2, size = echo->fields * echo->padded;
-    float y = (float)(row * (last + 1)) / (SONDE_MEDIUM_ROWS - 1);
-    uint32_t j = (uint32_t)y < last ? (uint32_t)y : last;
-    widen_job widen = {
-        .column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
-    for (; reached < j + 2; ++reached)
-      for (uint32_t field = 0; field < echo->fields; ++field) {
-        widen.in = echo->plane + field * SONDE_PLANE_NODES + reached * SONDE_PLANE_COLUMNS;
-        widen.out = echo->wide + reached % 2 * size + field * echo->padded;
-        echo->kernels->widen(&widen);
-      }
-    echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
-                       echo->row, size);
+    find_fields(echo, row, &reached);
     job.septum = echo->septum[row % 2];
     job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
-    job.rows_per_m = (float)((SONDE_MEDIUM_ROWS - 1) / f->depth_m);
+    job.rows_per_m = (float)((SONDE_MEDIUM_ROWS - 1) / f->reach_m);
     // Lines whose face does not touch the skin. A face reverberates: bands at multiples of its own
     // thickness, fading, as loud as what does not couple in.
     for (uint32_t l = 0; row == 0 && l < lines; ++l) {
@@ -379,13 +403,17 @@ void sonde_echo_medium(sonde_echo *echo) {
     }
     blur(echo, echo->loss_db);
     blur(echo, echo->tail);
+    if (sonde_sound_on(echo)) sonde_sound_step(echo, row);
     if (row > 0) add_interfaces(echo, row, crossed);
     if (row > 0 && !echo->plain) add_septa(echo, row);
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
       if (echo->air[l]) echo->scatter[l] = echo->rough[l] = 0;
-    for (uint32_t l = 0; l < lines; ++l)
-      echo->scatter[l] *= echo->coupling[l], echo->rough[l] *= echo->coupling[l];
+    for (uint32_t l = 0; l < lines; ++l) {
+      const float passed = echo->coupling[l] * echo->sound->spread[l];
+      echo->scatter[l] *= passed, echo->rough[l] *= passed;
+    }
     store_gain(echo, row);
     for (uint32_t l = 0; l < lines; ++l) echo->loss_db[l] += echo->loss[l] * step;
   }
+  if (sonde_sound_on(echo)) sonde_sound_end(echo);
 }

@@ -18,6 +18,7 @@ static const sonde_scanner_number numbers[] = {
     NUMBER("transmit_f", 1, 10, 2.5, 1, transmit_f),
     NUMBER("receive_f", 1, 10, 2, 1, receive_f),
     NUMBER("pulse_wavelengths", 0.8, 4, 1.1, 1, pulse_wavelengths),
+    NUMBER("sound_speeds", 0, 1, 0, 1, sound_speeds),
     NUMBER("looks", 1, SONDE_MOST_LOOKS, 1, 1, looks),
     NUMBER("look_deg", 0, 20, 0, SONDE_PI / 180, look_rad),
     NUMBER("noise_db", -150, 0, -118, 1, noise_db),
