@@ -1,5 +1,6 @@
 // sonde image: one echographic picture of a model, at any pose.
 #include "image_findings.h"
+#include "image_truth.h"
 #include "options.h"
 #include "scanner_choice.h"
 #include "settled.h"
@@ -10,10 +11,11 @@
 #include <string.h>
 
 typedef struct options {
-  const char *model, *probe, *pathology, *out, *scanner;
+  const char *model, *probe, *pathology, *out, *scanner, *truth;
   double numbers[7], size[2]; // of the pose as typed; pixels
   sonde_pose pose;
   bool posed, json;
+  double drawn_m[2]; // front to back of vein and artery, as the picture shows them
   long site, seed;
   double force_n, press_m, turn_rad, aperture_m, radius_m; // NaN when not asked for
   sonde_echo_settings settings;
@@ -74,6 +76,9 @@ static const app_option TABLE[] = {
     OPT_WHOLES(size, "size", "WxH", 16, 4096, "pixels"),
     OPT_INTEGER(seed, "seed", "N", 0, 1000000000, "of the tissue's scatterers"),
     OPT_OUTPUT(out, "o", "PNG", "the picture"),
+    OPT_TEXT(truth, "truth", "DIR",
+             "write what each pixel shows: tissue.png, vessel.png, labels.csv, place.nrrd, "
+             "displacement.nrrd, velocity.nrrd"),
     OPT_JSON(json),
     OPT_GROUP("The scanner"),
     OPT_TEXT(
@@ -169,6 +174,23 @@ static sonde_status choose_scanner(options *o, sonde_scanner *scanner, sonde_err
   return status;
 }
 
+// Diameters as the picture shows them: tissue of another sound speed is drawn thicker or thinner.
+static void measure_drawn(options *o, const settled *s, const sonde_echo *echo) {
+  for (int which = 0; which < 2; ++which) {
+    sonde_vessel_state v;
+    if (!sonde_interior_vessel_at_plane(s->interior, which, s->pose, &v)) continue;
+    sonde_vec3 end[2];
+    for (int side = 0; side < 2; ++side) {
+      const double h = side ? v.half_short_m : -v.half_short_m;
+      end[side] = sonde_truth_drawn(echo, (sonde_vec3){v.centre_m.x + h * v.flat_axis.x,
+                                                       v.centre_m.y + h * v.flat_axis.y,
+                                                       v.centre_m.z + h * v.flat_axis.z});
+    }
+    const double x = end[1].x - end[0].x, y = end[1].y - end[0].y, z = end[1].z - end[0].z;
+    o->drawn_m[which] = sqrt(x * x + y * y + z * z);
+  }
+}
+
 static int run(void *from) {
   options *o = from;
   assert(o->out && o->size[0] > 0 && o->size[1] > 0);
@@ -200,6 +222,9 @@ static int run(void *from) {
       if (lost)
         fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
       status = sonde_image_save_png(&image, o->out, &error);
+      measure_drawn(o, &s, echo);
+      if (!status && o->truth)
+        status = image_truth_write(o->truth, echo, s.interior, &image, &error);
     }
     sonde_echo_destroy(echo);
   }
@@ -227,6 +252,8 @@ static int run(void *from) {
           "case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
           o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
           a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
+      app_json("vein_drawn_mm:%g artery_drawn_mm:%g", v ? 1e3 * o->drawn_m[0] : NAN,
+               a ? 1e3 * o->drawn_m[1] : NAN);
       settled_branches(&s, true);
       app_json_end();
     }

@@ -6,6 +6,7 @@
 // segment.
 #include "base/base.h"
 #include "echo/bands.h"
+#include "echo/blood.h"
 #include "echo/sound.h"
 #include "interior/vessels.h"
 
@@ -56,6 +57,23 @@ static double map_segment(const sonde_echo *echo, const sonde_vessel_state *low,
   return fabsf(out->m[0][1]) <= 1 + beside ? SONDE_PI * half_short * half_long * length : 0;
 }
 
+// Path of the mean flow in a vessel since t = 0, m.
+static double path_of(const sonde_echo *echo, uint32_t which, double t_s) {
+  const sonde_echo_flow *flow = &echo->flow;
+  const double rate = flow->circulation.heart_rate_hz;
+  SONDE_ASSERT(which < echo->interior->vessel_count);
+  if (echo->interior->course[which].kind != SONDE_VESSEL_VEIN)
+    return rate > 0 ? -flow->artery_m_s / rate * beats_of(&flow->circulation, t_s)
+                    : -flow->artery_m_s * t_s;
+  if (sonde_echo_pathology(echo, which)->thrombus_fraction >= 1) return 0;
+  return flow->vein_m_s * t_s;
+}
+
+double sonde_blood_speed(const sonde_echo *echo, uint32_t which) {
+  const double half_s = 5e-3, t = echo->flow.t_s;
+  return (path_of(echo, which, t + half_s) - path_of(echo, which, t - half_s)) / (2 * half_s);
+}
+
 void sonde_echo_blood(sonde_echo *echo) {
   const sonde_interior *in = echo->interior;
   const double density = echo->per_cell / (echo->cell_m * echo->cell_m * echo->cell_m);
@@ -64,15 +82,7 @@ void sonde_echo_blood(sonde_echo *echo) {
   for (uint32_t shown = 0; shown < echo->shown_count; ++shown) {
     const uint32_t which = echo->shown[shown], sections = in->course[which].count;
     if (sections < 2) continue;
-    // Path of the mean flow in a vessel since t = 0, m.
-    const sonde_echo_flow *flow = &echo->flow;
-    const double rate = flow->circulation.heart_rate_hz;
-    double flowed_m = 0;
-    if (in->course[which].kind != SONDE_VESSEL_VEIN)
-      flowed_m = rate > 0 ? -flow->artery_m_s / rate * beats_of(&flow->circulation, flow->t_s)
-                          : -flow->artery_m_s * flow->t_s;
-    else if (!(sonde_echo_pathology(echo, which)->thrombus_fraction >= 1))
-      flowed_m = flow->vein_m_s * flow->t_s;
+    const double flowed_m = path_of(echo, which, echo->flow.t_s);
     const int32_t first = (int32_t)ceil(in->section[which][0].along_m / sonde_segment_m);
     const int32_t last = (int32_t)floor(in->section[which][sections - 1].along_m / sonde_segment_m);
     sonde_vessel_state low, high;

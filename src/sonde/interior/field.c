@@ -242,7 +242,8 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *in, sonde_vec3 point, son
 // Vessel label of a rest point, LABEL_COUNT when it lies in none. A branch begins in the lumen of
 // its parent: lumina hide walls. A mural clot fills the deep side of the lumen up to its free
 // surface.
-static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, double s) {
+sonde_label sonde_vessels_label(const sonde_interior *in, sonde_vec3 rest, double s,
+                                uint32_t *number) {
   static const double wall_m[2] = {0.7e-3, 0.9e-3}, wall_share = 0.25;
   sonde_label wall = SONDE_LABEL_COUNT;
   const uint64_t reaching = sonde_vessels_reaching(in, rest, s);
@@ -259,10 +260,12 @@ static sonde_label vessel_label(const sonde_interior *in, sonde_vec3 rest, doubl
     if (which >= 2) thick = fmin(thick, wall_share * v.rest_radius_m);
     if (r > v.rest_radius_m + thick) continue;
     if (r > v.rest_radius_m) {
-      if (wall == SONDE_LABEL_COUNT)
-        wall = artery ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
+      if (wall != SONDE_LABEL_COUNT) continue;
+      wall = artery ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
+      if (number != NULL) *number = which;
       continue;
     }
+    if (number != NULL) *number = which;
     if (artery) return SONDE_LABEL_ARTERY;
     const sonde_pathology *p = &in->pathology[which];
     if (!sonde_pathology_clot(p, rest.z)) return SONDE_LABEL_VEIN;
@@ -295,7 +298,7 @@ sonde_label sonde_interior_label(const sonde_interior *in, sonde_vec3 rest, doub
   } else if (sonde_interior_in_bone(in, rest, &at)) {
     return SONDE_LABEL_BONE;
   }
-  sonde_label vessel = vessel_label(in, rest, at.s);
+  sonde_label vessel = sonde_vessels_label(in, rest, at.s, NULL);
   if (vessel != SONDE_LABEL_COUNT) return vessel;
   sonde_label lesion = sonde_lesion_label(in, rest);
   if (lesion != SONDE_LABEL_COUNT) return lesion;

@@ -26,6 +26,10 @@ uint64_t sonde_vessels_reaching(const sonde_interior *interior, sonde_vec3 rest_
 void sonde_vessel_warp(const sonde_vessel_state *state, double *short_m, double *long_m);
 // Where the tissue's gradient carries it. @thread any
 void sonde_vessel_tissue(const sonde_vessel_state *state, double *short_m, double *long_m);
+// Wall, lumen or clot at a rest point at axial position s, and of which vessel (NULL: not asked
+// for); SONDE_LABEL_COUNT beside them. @thread any
+sonde_label sonde_vessels_label(const sonde_interior *interior, sonde_vec3 rest_m, double s_m,
+                                uint32_t *which);
 // A point goes first to where the walls near it warp the tissue, at rest still, then with the
 // field, and last to where the walls smooth the field's bends: the position of a rest point that
 // was warped to `warped_m` and that the field took to `moved_m`. @thread any
