@@ -38,10 +38,12 @@ static void prepare(void *to) {
                              .seed = 1};
 }
 
-static const char *const VESSELS[] = {"calf",           "popliteal",    "femoral", "common-femoral",
-                                      "external-iliac", "common-iliac", "artery",  NULL};
-static const char *const SEGMENTS[] = {
-    "calf", "popliteal", "femoral", "common-femoral", "external-iliac", "common-iliac", NULL};
+// In the order of sonde_flow_segment.
+#define SEGMENT_NAMES                                                                              \
+  "calf", "popliteal", "femoral", "common-femoral", "external-iliac", "common-iliac",              \
+      "deep-femoral", "great-saphenous"
+static const char *const VESSELS[] = {SEGMENT_NAMES, "artery", NULL};
+static const char *const SEGMENTS[] = {SEGMENT_NAMES, NULL};
 static const double RAD_PER_DEG = 0.017453292519943295, STRAIN_S = 5;
 
 static const app_option TABLE[] = {
@@ -58,15 +60,17 @@ static const app_option TABLE[] = {
     OPT_REAL(seconds, "seconds", "S", 2, 120, 1, "length of the recording; default 12"),
     OPT_OUTPUT(output, "o,output", "SVG", "draw the spectrum over time"),
     OPT_OUTPUT(csv, "csv", "FILE",
-               "write time, mean and peak of the spectrum, and the true mean velocity"),
+               "write time, mean and peak of the spectrum, and the true means in the gate and over "
+               "the lumen"),
     OPT_JSON(json),
     OPT_GROUP("The scanner"),
     OPT_REAL(angle_rad, "angle-deg", "A", 0, 180, 0.017453292519943295,
              "between beam and flow; 90 and about it measure nothing; default 60"),
     OPT_REAL(gate_m, "gate-mm", "G", 0.5, 20, 1e-3, "length of the gate; default 3"),
     OPT_REAL(frequency_hz, "frequency-mhz", "F", 1, 15, 1e6, "of the beam; default 5"),
-    OPT_REAL(pulse_hz, "prf-hz", "F", 500, 20000, 1,
-             "pulse repetition frequency; default 3000, for the artery and a squeeze 8000"),
+    OPT_REAL(
+        pulse_hz, "prf-hz", "F", 500, 20000, 1,
+        "pulse repetition frequency; default: one that the fastest blood of the recording needs"),
     OPT_INTEGER(seed, "seed", "N", 0, 1000000000, "of scatterers and noise; default 1")};
 
 static int check(void *from) {
@@ -91,15 +95,18 @@ typedef struct readings {
 typedef struct record {
   uint32_t count;
   double hop_s;
-  double *mean, *peak, *truth; // [count]
-  uint8_t *grey;               // [count * SONDE_DOPPLER_BINS] by column
-  double limit;
+  double *mean, *peak;   // [count] read off the spectrum
+  double *truth, *lumen; // [count] true mean velocity in the gate and over the lumen
+  uint8_t *grey;         // [count * SONDE_DOPPLER_BINS] by column
+  double limit, slowest; // velocities that are not folded, that pass the wall filter
 } record;
 
-static const double HOP_S = 0.01, DARKEST_DB = 36, FALLS_BACK_M_S = 0.005;
-enum { PULSE_SAMPLES = 64 };
+static const double HOP_S = 0.01, DARKEST_DB = 36, SPARE = 1.25;
+enum { HOP_STEPS = 10 }; // HOP_S over STEP_S
 
-static void clear(record *r) { free(r->mean), free(r->peak), free(r->truth), free(r->grey); }
+static void clear(record *r) {
+  free(r->mean), free(r->peak), free(r->truth), free(r->lumen), free(r->grey);
+}
 
 // Puts the median of five columns in the place of each, as scanners smooth their readings.
 static void smooth(double *value, double *scratch, uint32_t count) {
@@ -116,73 +123,112 @@ static void smooth(double *value, double *scratch, uint32_t count) {
   memcpy(value, scratch, count * sizeof *value);
 }
 
-// Runs network and gate side by side; a column of the spectrum every HOP_S, its time the middle of
-// its window.
-static sonde_status take(const options *a, const sonde_limb *limb, record *r, sonde_flow_def *flow,
-                         sonde_error *error) {
+// Blood under the gate: mean velocity over the lumen every STEP_S, and what gives it its profile.
+typedef struct blood {
+  uint32_t count;
+  double *mean_m_s; // [count]
+  double radius_m, fastest_m_s;
+  sonde_flow_def flow;
+} blood;
+
+static const double STEP_S = 1e-3, LONGEST_WINDOW_S = SONDE_DOPPLER_BINS / 500.0;
+
+// Mean velocity and profile a step after `n - 1`, or at the start.
+static void follow(const blood *b, uint32_t n, double profile[SONDE_FLOW_RINGS]) {
+  n = n < b->count ? n : b->count - 1;
+  if (n == 0) sonde_flow_steady(b->mean_m_s[0], profile);
+  if (n > 0) sonde_flow_follow(profile, b->radius_m, b->mean_m_s[n], STEP_S);
+}
+
+// Runs the network, with half a window beyond the recording.
+static sonde_status run_blood(const options *a, const sonde_limb *limb, blood *b,
+                              sonde_error *error) {
   bool artery = a->vessel == SONDE_FLOW_SEGMENTS;
   sonde_flow_segment segment = (sonde_flow_segment)(artery ? SONDE_FLOW_COMMON_FEMORAL : a->vessel);
+  sonde_flow_def *flow = &b->flow;
   *flow = sonde_flow_def_default(limb);
-  if (a->clot >= 0) flow->closed[a->clot] = a->clot_share;
+  for (int v = 0; v < SONDE_FLOW_VEINS && a->clot >= 0; ++v)
+    flow->closed[a->clot][v] = a->clot_share;
   flow->leak = a->leak;
   if (!isnan(a->squeeze_s)) flow->squeeze_from_s = a->squeeze_s;
   if (!isnan(a->valsalva_s))
     flow->valsalva_from_s = a->valsalva_s, flow->valsalva_to_s = a->valsalva_s + STRAIN_S;
-  sonde_doppler_def def = sonde_doppler_def_default();
-  double radius =
-      sqrt(flow->area_m2[segment] * fmax(1 - flow->closed[segment], 0.02) / 3.14159265358979);
-  if (artery) radius = 4e-3;
-  def.half_short_m = def.half_long_m = radius;
-  def.angle_rad = a->angle_rad, def.gate_m = fmin(a->gate_m, 2 * radius);
-  def.frequency_hz = a->frequency_hz, def.seed = (uint64_t)a->seed;
-  def.pulse_hz = isnan(a->pulse_hz) ? (artery || !isnan(a->squeeze_s) ? 8000 : 3000) : a->pulse_hz;
   sonde_flow net;
-  sonde_doppler *doppler = NULL;
   sonde_status status = sonde_flow_start(flow, &net, error);
+  if (status) return status;
+  const uint32_t branch =
+      artery && limb ? sonde_limb_vessel_find(limb, "common femoral artery") : SONDE_LIMB_NO_VESSEL;
+  b->radius_m = sqrt(fmax(sonde_flow_area(&net, segment, 0), 1e-6) / acos(-1));
+  if (artery) b->radius_m = 4.4e-3;
+  if (branch != SONDE_LIMB_NO_VESSEL)
+    b->radius_m = sonde_limb_vessel_place(limb, branch, 0.02).radius_m;
+  b->count = (uint32_t)((a->seconds + LONGEST_WINDOW_S) / STEP_S);
+  b->mean_m_s = calloc(b->count, sizeof *b->mean_m_s);
+  if (!b->mean_m_s) return app_error(error, SONDE_MEMORY, "out of memory");
+  double profile[SONDE_FLOW_RINGS];
+  for (uint32_t n = 0; n < b->count; ++n) {
+    if (n > 0 && !artery) sonde_flow_step(&net, STEP_S);
+    b->mean_m_s[n] = artery ? sonde_flow_artery(flow->heart_rate_hz * n * STEP_S)
+                            : sonde_flow_velocity(&net, segment);
+    follow(b, n, profile);
+    for (int k = 0; k < SONDE_FLOW_RINGS; ++k)
+      b->fastest_m_s = fmax(b->fastest_m_s, fabs(profile[k]));
+  }
+  return SONDE_OK;
+}
+
+// The gate on the blood; a column of the spectrum every HOP_S, its time the middle of its window.
+static sonde_status take(const options *a, const sonde_limb *limb, record *r, sonde_error *error) {
+  blood b = {0};
+  sonde_status status = run_blood(a, limb, &b, error);
+  sonde_doppler_def def = sonde_doppler_def_default();
+  def.half_short_m = def.half_long_m = b.radius_m;
+  def.angle_rad = a->angle_rad, def.gate_m = fmin(a->gate_m, 2 * b.radius_m);
+  def.frequency_hz = a->frequency_hz, def.seed = (uint64_t)a->seed;
+  // The beam's width spreads the spectrum by a fifth beyond the fastest blood.
+  def.pulse_hz = 1000;
+  double needed = 1000 * SPARE * b.fastest_m_s / sonde_doppler_limit(&def);
+  def.pulse_hz =
+      isnan(a->pulse_hz) ? fmin(fmax(500 * ceil(needed / 500), 1500), 20000) : a->pulse_hz;
+  sonde_doppler *doppler = NULL;
   if (!status) status = sonde_doppler_create(&def, &doppler, error);
-  r->count = (uint32_t)(a->seconds / HOP_S);
+  r->count = (uint32_t)(a->seconds / HOP_S), r->limit = sonde_doppler_limit(&def);
+  // Slower blood leaks through the filter's edge, up to one and a half bins beyond it.
+  r->slowest = 2 * r->limit * (def.filter_hz / def.pulse_hz + 1.5 / SONDE_DOPPLER_BINS);
   r->mean = calloc(r->count, sizeof *r->mean), r->peak = calloc(r->count, sizeof *r->peak);
-  r->truth = calloc(r->count, sizeof *r->truth);
+  r->truth = calloc(r->count, sizeof *r->truth), r->lumen = calloc(r->count, sizeof *r->lumen);
   r->grey = calloc(r->count, SONDE_DOPPLER_BINS);
   double *power = calloc(r->count, SONDE_DOPPLER_BINS * sizeof *power), most = 0;
-  if (!status && !(r->mean && r->peak && r->truth && r->grey && power))
-    status = SONDE_MEMORY, snprintf(error->message, sizeof error->message, "out of memory");
-  double pulse[PULSE_SAMPLES], profile[SONDE_FLOW_RINGS], table[PULSE_SAMPLES][SONDE_FLOW_RINGS];
-  for (int k = 0; k < PULSE_SAMPLES; ++k) pulse[k] = sonde_flow_artery((double)k / PULSE_SAMPLES);
-  for (int k = 0; k < PULSE_SAMPLES && artery; ++k)
-    sonde_flow_pulsed(pulse, PULSE_SAMPLES, radius, flow->heart_rate_hz, (double)k / PULSE_SAMPLES,
-                      table[k]);
-  // The window lies half before and half after its time.
-  double window_s = SONDE_DOPPLER_BINS / def.pulse_hz, time = -0.5 * window_s;
+  if (!status && !(r->mean && r->peak && r->truth && r->lumen && r->grey && power))
+    status = app_error(error, SONDE_MEMORY, "out of memory");
+  const double window_s = SONDE_DOPPLER_BINS / def.pulse_hz;
+  double time = -0.5 * window_s, profile[SONDE_FLOW_RINGS];
   uint64_t pulses = 0;
+  uint32_t step = 0;
+  if (!status) follow(&b, 0, profile), r->truth[0] = sonde_doppler_truth(doppler, profile);
   for (uint32_t column = 0; column < r->count && !status; ++column) {
-    double until = column * HOP_S;
-    r->truth[column] = artery ? sonde_flow_artery(flow->heart_rate_hz * until)
-                              : sonde_flow_velocity(&net, segment);
-    while (!artery && net.time_s < until - 1e-9) {
-      sonde_flow_step(&net, 1e-3);
-      r->truth[column] = sonde_flow_velocity(&net, segment);
-    }
-    for (; time < until + 0.5 * window_s; time = (double)++pulses / def.pulse_hz - 0.5 * window_s) {
-      double beat = flow->heart_rate_hz * time;
-      if (artery)
-        memcpy(profile, table[(int)((beat - floor(beat)) * PULSE_SAMPLES)], sizeof profile);
-      if (!artery) sonde_flow_steady(r->truth[column], profile);
+    const double now = column * HOP_S;
+    r->lumen[column] = b.mean_m_s[(uint32_t)lround(now / STEP_S)];
+    for (; time < now + 0.5 * window_s; time = (double)++pulses / def.pulse_hz - 0.5 * window_s) {
+      while (step < fmax(time, 0) / STEP_S) {
+        follow(&b, ++step, profile);
+        if (step % HOP_STEPS == 0 && step / HOP_STEPS < r->count)
+          r->truth[step / HOP_STEPS] = sonde_doppler_truth(doppler, profile);
+      }
       sonde_doppler_pulse(doppler, profile);
     }
     sonde_doppler_spectrum s;
     sonde_doppler_read(doppler, &s);
     r->mean[column] = s.mean_m_s, r->peak[column] = s.peak_m_s;
     memcpy(power + (size_t)column * SONDE_DOPPLER_BINS, s.power, sizeof s.power);
-    for (int b = 0; b < SONDE_DOPPLER_BINS; ++b) most = fmax(most, s.power[b]);
+    for (int k = 0; k < SONDE_DOPPLER_BINS; ++k) most = fmax(most, s.power[k]);
   }
   for (size_t i = 0; i < (size_t)r->count * SONDE_DOPPLER_BINS && !status; ++i) {
     double db = power[i] > 0 ? 10 * log10(power[i] / most) + 6 : -INFINITY;
     r->grey[i] = (uint8_t)lround(255 * pow(fmin(fmax(1 + db / DARKEST_DB, 0), 1), 1.2));
   }
   if (!status) smooth(r->mean, power, r->count), smooth(r->peak, power, r->count);
-  r->limit = sonde_doppler_limit(&def);
-  free(power);
+  free(power), free(b.mean_m_s);
   sonde_doppler_destroy(doppler);
   return status;
 }
@@ -194,13 +240,13 @@ static readings read_off(const options *a, const record *r) {
   out.peak = 0;
   double squeeze = isnan(a->squeeze_s) ? INFINITY : a->squeeze_s;
   double strain = isnan(a->valsalva_s) ? INFINITY : a->valsalva_s;
-  double from = 1, to = fmin(fmin(squeeze, strain), a->seconds), sum = 0, truth = 0;
+  double from = 1, to = fmin(fmin(squeeze, strain), a->seconds), sum = 0, truth = 0, lumen = 0;
   uint32_t count = 0;
   for (uint32_t k = 0; k < r->count; ++k) {
     double t = k * HOP_S;
     if (fabs(r->peak[k]) > fabs(out.peak)) out.peak = r->peak[k];
     if (t < from || t >= to) continue;
-    sum += r->mean[k], truth += r->truth[k], ++count;
+    sum += r->mean[k], truth += r->truth[k], lumen += r->lumen[k], ++count;
     // Extremes of means over a fifth of a second, which average the scatterers' chance.
     enum { BESIDE = 10 };
     double now = 0, true_now = 0;
@@ -211,15 +257,15 @@ static readings read_off(const options *a, const record *r) {
     low = fmin(low, true_now), high = fmax(high, true_now);
   }
   if (count)
-    out.mean = sum / count, out.truth_mean = truth / count,
+    out.mean = sum / count, out.truth_mean = lumen / count,
     out.truth_phasicity = (high - low) * count / truth;
   double greatest = -INFINITY, back = 0, truth_back = 0;
   for (uint32_t k = 0; k < r->count; ++k) {
     double t = k * HOP_S;
     if (t > squeeze && t < squeeze + 3) greatest = fmax(greatest, r->mean[k]);
     if (t < fmin(squeeze, strain)) continue;
-    if (r->mean[k] < -FALLS_BACK_M_S) back += HOP_S;
-    if (r->truth[k] < -0.5 * FALLS_BACK_M_S) truth_back += HOP_S;
+    if (r->mean[k] < -r->slowest) back += HOP_S;
+    if (r->truth[k] < -r->slowest) truth_back += HOP_S;
   }
   if (squeeze < a->seconds && count) out.augmentation = greatest / out.mean;
   if (fmin(squeeze, strain) < a->seconds) out.reflux = back, out.truth_reflux = truth_back;
@@ -252,8 +298,7 @@ static sonde_status draw(const options *a, const record *r, sonde_error *error) 
   // The picture's rows run from the highest velocity down; the axes may have been widened.
   sonde_image image = {.width = r->count, .height = SONDE_DOPPLER_BINS};
   image.pixels = malloc((size_t)image.width * image.height);
-  if (!image.pixels)
-    status = SONDE_MEMORY, snprintf(error->message, sizeof error->message, "out of memory");
+  if (!image.pixels) status = app_error(error, SONDE_MEMORY, "out of memory");
   for (uint32_t y = 0; y < image.height && !status; ++y)
     for (uint32_t x = 0; x < image.width; ++x)
       image.pixels[(size_t)y * image.width + x] =
@@ -279,19 +324,18 @@ static int run(void *from) {
   sonde_error error = {0};
   sonde_model *model = NULL;
   record r = {0};
-  sonde_flow_def flow;
   sonde_status status = sonde_limb_model_load(a->model, &model, &error);
   const sonde_limb *limb = status ? NULL : sonde_limb_of(model);
   app_progress_begin("taking the spectrum");
-  if (!status) status = take(a, limb, &r, &flow, &error);
+  if (!status) status = take(a, limb, &r, &error);
   if (!status && a->output) status = draw(a, &r, &error);
   sonde_file *file = NULL;
   if (!status && a->csv) status = sonde_file_create(a->csv, &file, &error);
   if (!status && file) {
-    sonde_file_printf(file, "time_s,mean_cm_s,peak_cm_s,true_mean_cm_s\n");
+    sonde_file_printf(file, "time_s,mean_cm_s,peak_cm_s,true_mean_cm_s,true_lumen_cm_s\n");
     for (uint32_t k = 0; k < r.count; ++k)
-      sonde_file_printf(file, "%.2f,%.4f,%.4f,%.4f\n", k * HOP_S, 100 * r.mean[k], 100 * r.peak[k],
-                        100 * r.truth[k]);
+      sonde_file_printf(file, "%.2f,%.4f,%.4f,%.4f,%.4f\n", k * HOP_S, 100 * r.mean[k],
+                        100 * r.peak[k], 100 * r.truth[k], 100 * r.lumen[k]);
     status = sonde_file_commit(file, &error);
   }
   app_progress_end();

@@ -190,6 +190,33 @@ const GROUPS = {
       return values
     },
   },
+  // What Doppler reads off the veins of four legs, and off the network itself; spreads over the legs.
+  flow: {
+    sources: ['src/sonde-limb', 'app/cmd_doppler.c'],
+    measure(bin) {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-')), legs = []
+      for (const [seed, sex, bmi] of [['29', 'female', '19.5'], ['3', 'male', '24'], ['7', 'female', '31'], ['12', 'male', '34']]) {
+        const path = join(folder, 'leg.sonde')
+        run(bin, 'sonde', 'limb', '--seed', seed, '--sex', sex, '--bmi', bmi, '--model', path)
+        const take = (...options) => json(bin, 'doppler', path, ...options)
+        legs.push({
+          rest: take(), femoral: take('--vessel', 'femoral'), artery: take('--vessel', 'artery'), groin: take('--squeeze-s', '8'),
+          knee: take('--vessel', 'popliteal', '--squeeze-s', '8'), leak: take('--vessel', 'popliteal', '--squeeze-s', '8', '--leak', '1'),
+          clot: take('--squeeze-s', '8', '--clot', 'external-iliac'), strain: take('--valsalva-s', '6'),
+        })
+      }
+      rmSync(folder, { recursive: true })
+      const values = {}, all = (name, of) => { values[name] = spread(legs, of) }
+      all('lumen_cm_s', l => l.rest.true_mean_cm_s), all('gate_cm_s', l => l.rest.mean_cm_s), all('peak_cm_s', l => l.rest.peak_cm_s)
+      all('femoral_peak_cm_s', l => l.femoral.peak_cm_s), all('artery_peak_cm_s', l => l.artery.peak_cm_s)
+      all('phasicity', l => l.rest.phasicity), all('augmentation', l => l.groin.augmentation)
+      all('squeeze_peak_cm_s', l => l.knee.peak_cm_s), all('reflux_s', l => l.knee.reflux_s), all('leak_s', l => l.leak.reflux_s)
+      all('clot_phasicity', l => l.clot.phasicity), all('clot_augmentation', l => l.clot.augmentation), all('strain_s', l => l.strain.reflux_s)
+      values.phasicity_off_percent = Math.max(...legs.map(l => 100 * Math.abs(l.rest.phasicity / l.rest.true_phasicity - 1)))
+      values.reflux_off_s = Math.max(...legs.flatMap(l => [l.knee, l.leak, l.strain].map(r => Math.abs(r.reflux_s - r.true_reflux_s))))
+      return values
+    },
+  },
   hostile: {
     sources: ['src/sonde/interior', 'src/sonde/world'],
     measure(bin) {
@@ -253,6 +280,19 @@ const BLOCKS = {
         ...(r.equal_step_ms === null ? ['', '', 'not reached', ''] : [fixed(r.equal_nodes, 0), `${fixed(r.equal_setup_ms, 0)} ms`, `${fixed(r.equal_step_ms, 3)} ms`, fixed(r.times, 1)]),
         `${fixed(r.same_step_ms, 3)} ms`])),
   paper_figures: ({ paper }) => table(['figure', 'what it shows'], Object.values(paper.figures).map(f => [f.title.replace(/\..*/, ''), f.caption])),
+  flow({ flow }) {
+    const from = (e, decimals, unit = '') => `${fixed(e.least, decimals)} to ${fixed(e.most, decimals)}${unit}`
+    return table(['', 'Sonde', 'published'], [
+      ['common femoral vein at rest: mean in the gate; over the lumen', `${from(flow.gate_cm_s, 1)}; ${from(flow.lumen_cm_s, 1, ' cm/s')}`, '9 to 15 cm/s'],
+      ['common femoral, femoral vein at rest: peak', `${from(flow.peak_cm_s, 0)}; ${from(flow.femoral_peak_cm_s, 0, ' cm/s')}`, '12 to 30 cm/s'],
+      ['phasicity in the groin; augmentation', `${from(flow.phasicity, 2)}; ${from(flow.augmentation, 1, ' times')}`, 'flow falls with the breath, may stop'],
+      ['squeeze of the calf, popliteal vein: peak', from(flow.squeeze_peak_cm_s, 0, ' cm/s'), '89 +- 35'],
+      ['popliteal vein: blood falls back, valves sound; leaking', `${from(flow.reflux_s, 2)}; ${from(flow.leak_s, 2, ' s')}`, 'median 0.19, 95 % below 0.66; more than 1 s standing'],
+      ['clot in the pelvis: phasicity in the groin; augmentation', `${from(flow.clot_phasicity, 2)}; ${from(flow.clot_augmentation, 1, ' times')}`, 'lost; weak'],
+      ['strain: reversal, then none', from(flow.strain_s, 2, ' s'), 'stop or less than 0.5 s back'],
+      ['common femoral artery: peak', from(flow.artery_peak_cm_s, 0, ' cm/s'), '114 +- 25'],
+    ])
+  },
   limb_faults: ({ limb }) => table(['law', `violations in ${limb.limbs} limbs, ${fixed(limb.places, 0)} places`],
     [['walls of two vessels 0.3 mm apart or more', limb.walls], ['deep vessels 1.5 mm or more from bone', limb.bone], ['no lumen in bone', limb.lumen],
       ['deep vessels 0.3 mm or more under the deep fascia', limb.fascia], ['saphenous veins between both fasciae', limb.eye]]),

@@ -18,7 +18,7 @@ extern "C" {
 
 /* ---- network ------------------------------------------------------------------------------ */
 
-/** Segments of the way to the heart, from the calf up. */
+/** Segments of the way to the heart from the calf up, and two that join it. */
 typedef enum sonde_flow_segment {
   SONDE_FLOW_CALF, /**< tibial, peroneal and muscle veins taken together */
   SONDE_FLOW_POPLITEAL,
@@ -26,27 +26,41 @@ typedef enum sonde_flow_segment {
   SONDE_FLOW_COMMON_FEMORAL,
   SONDE_FLOW_EXTERNAL_ILIAC,
   SONDE_FLOW_COMMON_ILIAC,
+  SONDE_FLOW_DEEP_FEMORAL,    /**< joins the common femoral vein, as the next one does */
+  SONDE_FLOW_GREAT_SAPHENOUS, /**< of thigh and calf */
   SONDE_FLOW_SEGMENTS
 } sonde_flow_segment;
 
 /** Name of a segment, such as "common-femoral". Never NULL. @thread any */
 SONDE_API const char *sonde_flow_segment_name(sonde_flow_segment segment);
 
+/** Veins side by side in a segment: the main one, where a gate lies, and its companions. */
+enum { SONDE_FLOW_VEINS = 11 };
+
 /** A patient's veins and what is done to them. */
 typedef struct sonde_flow_def {
-  double length_m[SONDE_FLOW_SEGMENTS]; /**< of the vein, > 0 */
-  double area_m2[SONDE_FLOW_SEGMENTS];  /**< of the lumen at rest, both of a pair together */
-  double closed[SONDE_FLOW_SEGMENTS]; /**< share of the area that a clot or a probe takes, 0 to 1 */
-  double leak;                        /**< what valves leave open to blood that falls back: 0
-                                           competent to 1 none */
-  double inflow_m3_s;                 /**< through all capillaries at rest, > 0; default 7e-6 */
+  double length_m[SONDE_FLOW_SEGMENTS];                  /**< of the segment, > 0 */
+  double area_m2[SONDE_FLOW_SEGMENTS][SONDE_FLOW_VEINS]; /**< mean of each lumen at rest; the main
+                                                            one's > 0, 0: no such companion */
+  double closed[SONDE_FLOW_SEGMENTS][SONDE_FLOW_VEINS];  /**< share of each area that a clot or a
+                                                              probe takes, 0 to 1 */
+  /** Resistance over that of even lumina of these areas, > 0: above 1 where veins have narrow
+   * places. */
+  double narrow[SONDE_FLOW_SEGMENTS];
+  /** Tissue whose small veins drain into the segment: it holds blood and takes its share of the
+   * inflow. That of the common iliac vein lies in the pelvis, beyond the leg. */
+  double tissue_m3[SONDE_FLOW_SEGMENTS];
+  double leak;        /**< what valves leave open to blood that falls back: 0
+                           competent to 1 none */
+  double inflow_m3_s; /**< through the common femoral artery at rest, > 0; default 350 ml/min */
   double heart_rate_hz, breath_rate_hz; /**< default 1.15, 0.25 */
   double breath_pa;                     /**< swing of the pressure in the belly; default 47 */
-  double squeeze_from_s, squeeze_pa;    /**< a hand on the calf for 1.2 s; default never */
+  double squeeze_from_s, squeeze_pa;    /**< a hand on the calf for 1.5 s; default never */
   double valsalva_from_s, valsalva_to_s, valsalva_pa; /**< default never; 4000 Pa */
 } sonde_flow_def;
 
-/** Typical veins, or those of a limb when it is not NULL. @thread any */
+/** Typical veins, or those of a limb when it is not NULL: lengths, areas and companions of its
+ * branches, the calf's volume, the inflow of its artery. @thread any */
 SONDE_API sonde_flow_def sonde_flow_def_default(const sonde_limb *limb);
 
 /** Volumes, flows and valves of the segments: a value, to be copied freely. */
@@ -54,12 +68,14 @@ typedef struct sonde_flow {
   sonde_flow_def def;
   double time_s;
   double volume_m3[SONDE_FLOW_SEGMENTS];
+  double rest_m3[SONDE_FLOW_SEGMENTS];   /**< volume at rest, open: areas grow with volumes */
+  double empty_m3[SONDE_FLOW_SEGMENTS];  /**< volume at which the walls carry no pressure */
   double flow_m3_s[SONDE_FLOW_SEGMENTS]; /**< out of each segment, towards the heart */
   double open[SONDE_FLOW_SEGMENTS];      /**< how far the segment's valve is open, 0 to 1 */
 } sonde_flow;
 
 /**
- * Starts at t = 0 in the steady state without breath and manoeuvre.
+ * Starts at t = 0 in the steady state, clots included, without breath, beat and manoeuvre.
  * @return ARGUMENT naming the value of the definition that is out of range
  * @thread any
  */
@@ -67,7 +83,13 @@ SONDE_API sonde_status sonde_flow_start(const sonde_flow_def *def, sonde_flow *f
                                         sonde_error *error);
 /** One implicit step of dt_s (1e-5 to 1e-2). About a microsecond. @thread any (tick) */
 SONDE_API void sonde_flow_step(sonde_flow *flow, double dt_s);
-/** Mean velocity in the open part of a segment, m/s. @thread any (tick) */
+/** Blood through one of the veins of a segment, m3/s: conductances add up. @thread any (tick) */
+SONDE_API double sonde_flow_through(const sonde_flow *flow, sonde_flow_segment segment,
+                                    uint32_t vein);
+/** Open area of one of the veins now, m2. @thread any (tick) */
+SONDE_API double sonde_flow_area(const sonde_flow *flow, sonde_flow_segment segment, uint32_t vein);
+/** Mean velocity in the open part of a segment's main vein, m/s; 0 when it is closed.
+ * @thread any (tick) */
 SONDE_API double sonde_flow_velocity(const sonde_flow *flow, sonde_flow_segment segment);
 /** Pressure in a segment above the atmosphere's, Pa, lying. @thread any (tick) */
 SONDE_API double sonde_flow_pressure(const sonde_flow *flow, sonde_flow_segment segment);
@@ -81,6 +103,16 @@ enum { SONDE_FLOW_RINGS = 33, SONDE_FLOW_HARMONICS = 12 };
 /** Parabola of a mean velocity: ring k lies at k/(SONDE_FLOW_RINGS - 1) of the radius; in an
  * ellipse the same along every radius, which is exact. @thread any (tick) */
 SONDE_API void sonde_flow_steady(double mean_m_s, double profile_m_s[SONDE_FLOW_RINGS]);
+/**
+ * A profile after dt_s, when the pressure gradient gives it this mean: the axial momentum of rings
+ * that rub on each other, implicit in time. Slow flow becomes the parabola, a pulse Womersley's
+ * profile, a sudden push is blunt at first.
+ * @param[in,out] profile_m_s any before the first step, such as a parabola's
+ * @param radius_m of a round lumen; of an ellipse sqrt(2 a^2 b^2/(a^2 + b^2))
+ * @thread any (tick)
+ */
+SONDE_API void sonde_flow_follow(double profile_m_s[SONDE_FLOW_RINGS], double radius_m,
+                                 double mean_m_s, double dt_s);
 /**
  * Womersley's profile of a periodic flow in a round tube.
  * @param mean_m_s [samples] mean velocity over one period, samples >= 2 SONDE_FLOW_HARMONICS
@@ -129,6 +161,10 @@ typedef struct sonde_doppler_spectrum {
 /** Hann-weighted spectrum, wall filter applied; zeros until there are as many pulses. @thread tick
  */
 SONDE_API void sonde_doppler_read(const sonde_doppler *doppler, sonde_doppler_spectrum *spectrum);
+/** Mean velocity of the blood in the gate, by the beam's weight: what the mean of a spectrum
+ * without walls, noise, filter and chance would be. @thread any */
+SONDE_API double sonde_doppler_truth(const sonde_doppler *doppler,
+                                     const double profile_m_s[SONDE_FLOW_RINGS]);
 /** Velocity from the phase between neighbouring pulses of the same window. @thread tick */
 SONDE_API double sonde_doppler_phase_velocity(const sonde_doppler *doppler);
 /** Highest velocity that is not folded: c pulse_hz / (4 f |cos angle|). @thread any */

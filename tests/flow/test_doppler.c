@@ -44,6 +44,31 @@ static void test_profiles(void **unused) {
   assert_near(p[16], p[0], 0.01);
 }
 
+// Stepped in time, a steady mean becomes the parabola, a pulse after some beats Womersley's
+// profile.
+static void test_follows(void **unused) {
+  (void)unused;
+  double p[SONDE_FLOW_RINGS] = {0}, q[SONDE_FLOW_RINGS], mean[64];
+  for (int n = 0; n < 20000; ++n) sonde_flow_follow(p, 4e-3, 0.1, 1e-3);
+  for (int k = 0; k < SONDE_FLOW_RINGS; ++k) {
+    double r = k / (SONDE_FLOW_RINGS - 1.0);
+    assert_near(p[k], 0.2 * (1 - r * r), 3e-4);
+  }
+  const double rate = 1.25, dt = 0.5e-3; // 1600 steps a beat
+  double worst = 0;
+  for (int i = 0; i < 64; ++i) mean[i] = 0.1 + 0.3 * cos(2 * M_PI * i / 64.0);
+  for (int n = 1; n <= 16000; ++n) {
+    double phase = n * dt * rate;
+    sonde_flow_follow(p, 4e-3, 0.1 + 0.3 * cos(2 * M_PI * phase), dt);
+    if (n <= 14400 || n % 200) continue;
+    sonde_flow_pulsed(mean, 64, 4e-3, rate, phase, q);
+    for (int k = 0; k < SONDE_FLOW_RINGS; ++k) worst = fmax(worst, fabs(p[k] - q[k]));
+  }
+  print_message("steps in time against Womersley: within %.2f %% of the pulse\n",
+                100 * worst / 0.3);
+  assert_true(worst < 0.01 * 0.3);
+}
+
 // The truth that a gate sees: the profile weighted by the beam and cut by the gate.
 static double gate_mean(const sonde_doppler_def *def, double mean) {
   double sum = 0, weight = 0;
@@ -90,7 +115,12 @@ static void test_velocity(void **unused) {
                                       {0, 0.1},  {120, 0.1}, {60, -0.1}};
     sonde_doppler_def def = sonde_doppler_def_default();
     def.angle_rad = CASE[k][0] * M_PI / 180, def.pulse_hz = 4000, def.noise_db = -30;
-    double phase, spectral, wanted = gate_mean(&def, CASE[k][1]);
+    double phase, spectral, wanted = gate_mean(&def, CASE[k][1]), profile[SONDE_FLOW_RINGS];
+    sonde_doppler *gate = NULL;
+    assert_int_equal(sonde_doppler_create(&def, &gate, NULL), SONDE_OK);
+    sonde_flow_steady(CASE[k][1], profile);
+    assert_near(sonde_doppler_truth(gate, profile) / wanted, 1, 0.01);
+    sonde_doppler_destroy(gate);
     measure(&def, CASE[k][1], &phase, &spectral);
     print_message("%3.0f degrees, %5.2f m/s: phase %.4f, spectrum %.4f of %.4f\n", CASE[k][0],
                   CASE[k][1], phase, spectral, wanted);
@@ -128,6 +158,7 @@ static void test_refuses(void **unused) {
 
 int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_profiles),
+                                     cmocka_unit_test(test_follows),
                                      cmocka_unit_test(test_velocity), cmocka_unit_test(test_folds),
                                      cmocka_unit_test(test_refuses)};
   if (argc > 1) cmocka_set_test_filter(argv[1]);

@@ -18,9 +18,10 @@ typedef struct scatterer {
 
 struct sonde_doppler {
   sonde_doppler_def def;
-  uint64_t drawn; // random numbers so far
-  double reach_m; // scatterers live so far on either side along the vessel
-  double blood;   // root mean square of the blood's echo
+  uint64_t drawn;                // random numbers so far
+  double reach_m;                // scatterers live so far on either side along the vessel
+  double blood;                  // root mean square of the blood's echo
+  double ring[SONDE_FLOW_RINGS]; // share of each ring in the gate, by power
   uint64_t pulses;
   double echo[BINS][2]; // of the last pulses, pulse p at p % BINS
   double cosine[BINS], sine[BINS], window[BINS];
@@ -43,6 +44,35 @@ sonde_doppler_def sonde_doppler_def_default(void) {
 double sonde_doppler_limit(const sonde_doppler_def *def) {
   SONDE_ASSERT(def && def->frequency_hz > 0);
   return sound_m_s * def->pulse_hz / (4 * def->frequency_hz * fabs(cos(def->angle_rad)));
+}
+
+// Places in the lumen and along it, each with the power that beam and gate give it, by ring.
+static void weigh_rings(sonde_doppler *d) {
+  enum { PLACES = 40 };
+  const sonde_doppler_def *def = &d->def;
+  const double cosine = cos(def->angle_rad), sine = sin(def->angle_rad);
+  double sum = 0;
+  for (int n = 0; n < PLACES * PLACES * PLACES; ++n) {
+    const double u = (n % PLACES + 0.5) / PLACES * 2 - 1;
+    const double v = (n / PLACES % PLACES + 0.5) / PLACES * 2 - 1;
+    const double along = d->reach_m * ((n / (PLACES * PLACES) + 0.5) / PLACES * 2 - 1);
+    const double radius = sqrt(u * u + v * v), across = u * def->half_short_m;
+    const double z = along * cosine + across * sine, x = along * sine - across * cosine;
+    if (radius >= 1 || fabs(z) > 0.5 * def->gate_m) continue;
+    const double power =
+        exp(-pow(x / def->beam_m, 2) - pow(v * def->half_long_m / (2 * def->beam_m), 2));
+    const double at = radius * (SONDE_FLOW_RINGS - 1);
+    const int k = (int)at;
+    d->ring[k] += (1 - (at - k)) * power, d->ring[k + 1] += (at - k) * power, sum += power;
+  }
+  for (int k = 0; k < SONDE_FLOW_RINGS && sum > 0; ++k) d->ring[k] /= sum;
+}
+
+double sonde_doppler_truth(const sonde_doppler *d, const double profile_m_s[SONDE_FLOW_RINGS]) {
+  SONDE_ASSERT(d && profile_m_s);
+  double mean = 0;
+  for (int k = 0; k < SONDE_FLOW_RINGS; ++k) mean += d->ring[k] * profile_m_s[k];
+  return mean;
 }
 
 sonde_status sonde_doppler_create(const sonde_doppler_def *def, sonde_doppler **out,
@@ -92,6 +122,7 @@ sonde_status sonde_doppler_create(const sonde_doppler_def *def, sonde_doppler **
     power += fabs(z) < 0.5 * def->gate_m ? 2 * w * w : 0;
   }
   d->blood = sqrt(fmax(power, 1));
+  weigh_rings(d);
   for (int k = 0; k < BINS; ++k) {
     d->cosine[k] = cos(2 * SONDE_PI * k / BINS), d->sine[k] = sin(2 * SONDE_PI * k / BINS);
     d->window[k] = 0.5 - 0.5 * d->cosine[k];
@@ -132,31 +163,40 @@ void sonde_doppler_pulse(sonde_doppler *d, const double profile_m_s[SONDE_FLOW_R
         sum[c] / d->blood + noise * sonde_random_normal(def->seed, d->drawn++) + (c ? 0 : wall);
 }
 
+// The echoes of the window in the order of time, without the walls' echo: that does not move and is
+// their mean under the weights, and weighted themselves when `weighted`.
+static void hear(const sonde_doppler *d, bool weighted, double echo[BINS][2]) {
+  double wall[2] = {0, 0}, sum = 0;
+  for (int n = 0; n < BINS; ++n) {
+    const double w = weighted ? d->window[n] : 1;
+    sum += w;
+    for (int c = 0; c < 2; ++c) {
+      echo[n][c] = d->echo[(d->pulses + (uint64_t)n) % BINS][c];
+      wall[c] += w * echo[n][c];
+    }
+  }
+  for (int n = 0; n < BINS; ++n)
+    for (int c = 0; c < 2; ++c)
+      echo[n][c] = (weighted ? d->window[n] : 1) * (echo[n][c] - wall[c] / sum);
+}
+
 void sonde_doppler_read(const sonde_doppler *d, sonde_doppler_spectrum *out) {
   SONDE_ASSERT(d && out);
   *out = (sonde_doppler_spectrum){.mean_m_s = 0};
   double limit = sonde_doppler_limit(&d->def), away = cos(d->def.angle_rad) < 0 ? -1 : 1;
   for (int b = 0; b < BINS; ++b) out->velocity_m_s[b] = limit * (b - BINS / 2) / (BINS / 2);
   if (d->pulses < BINS) return;
-  // The walls' echo, which does not move, is the window's weighted mean.
-  double wall[2] = {0, 0}, weight = 0;
-  for (int n = 0; n < BINS; ++n) {
-    const double *echo = d->echo[(d->pulses + (uint64_t)n) % BINS];
-    weight += d->window[n];
-    for (int c = 0; c < 2; ++c) wall[c] += d->window[n] * echo[c];
-  }
-  for (int c = 0; c < 2; ++c) wall[c] /= weight;
+  double echo[BINS][2];
+  hear(d, true, echo);
   // Towards the probe is a positive shift; away from it the spectrum is turned round.
   double sorted[BINS], whole = 0;
   for (int b = 0; b < BINS; ++b) {
     int shift = b - BINS / 2, f = (int)(away * shift + BINS) % BINS;
     double sum[2] = {0, 0};
     for (int n = 0; n < BINS; ++n) {
-      const double *echo = d->echo[(d->pulses + (uint64_t)n) % BINS];
       int turn = (int)(((unsigned)f * (unsigned)n) % BINS);
-      double w = d->window[n], x = w * (echo[0] - wall[0]), y = w * (echo[1] - wall[1]);
-      sum[0] += x * d->cosine[turn] + y * d->sine[turn];
-      sum[1] += y * d->cosine[turn] - x * d->sine[turn];
+      sum[0] += echo[n][0] * d->cosine[turn] + echo[n][1] * d->sine[turn];
+      sum[1] += echo[n][1] * d->cosine[turn] - echo[n][0] * d->sine[turn];
     }
     bool kept = abs(shift) * d->def.pulse_hz / BINS >= fmax(d->def.filter_hz, 0);
     out->power[b] = kept ? sum[0] * sum[0] + sum[1] * sum[1] : 0;
@@ -188,15 +228,11 @@ void sonde_doppler_read(const sonde_doppler *d, sonde_doppler_spectrum *out) {
 double sonde_doppler_phase_velocity(const sonde_doppler *d) {
   SONDE_ASSERT(d != NULL);
   if (d->pulses < BINS) return 0;
-  // The walls' echo, which does not move, is the mean of the window.
-  double mean[2] = {0, 0}, real = 0, imaginary = 0;
-  for (int n = 0; n < BINS; ++n)
-    for (int c = 0; c < 2; ++c) mean[c] += d->echo[n][c] / BINS;
+  double echo[BINS][2], real = 0, imaginary = 0;
+  hear(d, false, echo);
   for (int n = 1; n < BINS; ++n) {
-    const double *p = d->echo[(d->pulses + (uint64_t)n - 1) % BINS];
-    const double *q = d->echo[(d->pulses + (uint64_t)n) % BINS];
-    double a = p[0] - mean[0], b = p[1] - mean[1], c = q[0] - mean[0], e = q[1] - mean[1];
-    real += a * c + b * e, imaginary += a * e - b * c;
+    const double *p = echo[n - 1], *q = echo[n];
+    real += p[0] * q[0] + p[1] * q[1], imaginary += p[0] * q[1] - p[1] * q[0];
   }
   double away = cos(d->def.angle_rad) < 0 ? -1 : 1;
   return away * sonde_doppler_limit(&d->def) * atan2(imaginary, real) / SONDE_PI;

@@ -3,10 +3,9 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "flow/blood.h"
 
 #include <complex.h>
-
-static const double blood_m2_s = 3.5e-3 / 1060;
 
 void sonde_flow_steady(double mean_m_s, double profile_m_s[SONDE_FLOW_RINGS]) {
   SONDE_ASSERT(isfinite(mean_m_s));
@@ -14,6 +13,35 @@ void sonde_flow_steady(double mean_m_s, double profile_m_s[SONDE_FLOW_RINGS]) {
     double r = (double)k / (SONDE_FLOW_RINGS - 1);
     profile_m_s[k] = 2 * mean_m_s * (1 - r * r);
   }
+}
+
+void sonde_flow_follow(double profile_m_s[SONDE_FLOW_RINGS], double radius_m, double mean_m_s,
+                       double dt_s) {
+  SONDE_ASSERT(profile_m_s && radius_m > 0 && dt_s > 0 && isfinite(mean_m_s));
+  // Balance of the ring between r - h/2 and r + h/2 in units of the radius, times r h: the step
+  // matrix is the same for the velocities before and for a push of 1 on every ring.
+  enum { INNER = SONDE_FLOW_RINGS - 1 }; // at the wall blood stands
+  const double h = 1.0 / INNER, spread = BLOOD_M2_S * dt_s / (radius_m * radius_m);
+  double above[INNER], before[INNER], push[INNER], moved = 0, pushed = 0;
+  for (int k = 0; k < INNER; ++k) {
+    const double volume = k ? k * h * h : h * h / 8;
+    const double inside = k ? spread * (k - 0.5) : 0, outside = spread * (k + 0.5);
+    const double part = k ? inside / above[k - 1] : 0;
+    above[k] = volume + inside + outside - (k ? part * spread * (k - 0.5) : 0);
+    before[k] = volume * profile_m_s[k] + (k ? part * before[k - 1] : 0);
+    push[k] = volume + (k ? part * push[k - 1] : 0);
+  }
+  for (int k = INNER; k-- > 0;) {
+    const double outside = spread * (k + 0.5);
+    before[k] = (before[k] + (k + 1 < INNER ? outside * before[k + 1] : 0)) / above[k];
+    push[k] = (push[k] + (k + 1 < INNER ? outside * push[k + 1] : 0)) / above[k];
+    // Weights of rings that are linear in between.
+    const double weight = k ? 2 * k * h * h : h * h / 3;
+    moved += weight * before[k], pushed += weight * push[k];
+  }
+  for (int k = 0; k < INNER; ++k)
+    profile_m_s[k] = before[k] + (mean_m_s - moved) / pushed * push[k];
+  profile_m_s[INNER] = 0;
 }
 
 // Bessel functions of the first kind, orders 0 and 1, by their series: |z| <= 20 or so.
@@ -41,7 +69,7 @@ void sonde_flow_pulsed(const double *mean_m_s, uint32_t samples, double radius_m
       sonde_flow_steady(creal(c), profile_m_s);
       continue;
     }
-    double alpha = radius_m * sqrt(2 * SONDE_PI * rate_hz * h / blood_m2_s);
+    double alpha = radius_m * sqrt(2 * SONDE_PI * rate_hz * h / BLOOD_M2_S);
     double complex lambda = alpha * cexp(0.75 * SONDE_PI * I), j0, j1, inner, unused;
     bessel(lambda, &j0, &j1);
     double complex below = j0 - 2 * j1 / lambda;
