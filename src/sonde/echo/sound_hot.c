@@ -96,8 +96,19 @@ static void move_rays(sonde_sound *s, uint32_t lines, float on) {
     vstore_float_x4(s->line + l, vload_float_x4(s->line + l) + on * vload_float_x4(s->turn + l));
   for (uint32_t l = 0; l + 1 < lines; l += 4)
     crossed |= vload_float_x4(s->line + l + 1) - vload_float_x4(s->line + l) < least_gap;
-  for (uint32_t l = 1; vany(crossed) && l < lines; ++l)
-    if (s->line[l] < s->line[l - 1] + least_gap) s->line[l] = s->line[l - 1] + least_gap;
+  if (!vany(crossed)) return;
+  // Half-way between pushing them apart from the left and from the right.
+  float pushed[SONDE_MOST_LINES];
+  pushed[0] = s->line[0];
+  for (uint32_t l = 1; l < lines; ++l) {
+    const float least = pushed[l - 1] + least_gap;
+    pushed[l] = s->line[l] < least ? least : s->line[l];
+  }
+  for (uint32_t l = lines - 1; l-- > 0;) {
+    const float most = s->line[l + 1] - least_gap;
+    if (s->line[l] > most) s->line[l] = most;
+  }
+  for (uint32_t l = 0; l < lines; ++l) s->line[l] = 0.5f * (s->line[l] + pushed[l]);
 }
 
 void sonde_sound_step(sonde_echo *echo, uint32_t row) {
