@@ -29,6 +29,7 @@
 #include "sonde/echo_scanner.h"
 #include "sonde/echo_validate.h"
 #include "sonde/sweep_frames.h"
+#include "sonde/sweep_strain.h"
 #include "sonde/sweep_truth.h"
 #include "sonde/sweep_volume.h"
 #include "sonde/haptics.h"
