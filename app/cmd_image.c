@@ -1,5 +1,6 @@
 // sonde image: one echographic picture of a model, at any pose.
 #include "image_findings.h"
+#include "image_strain.h"
 #include "image_truth.h"
 #include "options.h"
 #include "scanner_choice.h"
@@ -11,7 +12,7 @@
 #include <string.h>
 
 typedef struct options {
-  const char *model, *probe, *pathology, *out, *scanner, *truth;
+  const char *model, *probe, *pathology, *out, *scanner, *truth, *strain;
   double numbers[7], size[2]; // of the pose as typed; pixels
   sonde_pose pose;
   bool posed, json;
@@ -79,6 +80,9 @@ static const app_option TABLE[] = {
     OPT_TEXT(truth, "truth", "DIR",
              "write what each pixel shows: tissue.png, vessel.png, labels.csv, place.nrrd, "
              "displacement.nrrd, velocity.nrrd"),
+    OPT_TEXT(strain, "strain", "DIR",
+             "press half a millimetre further and write the strain that tracked echoes show "
+             "(strain.png), the true one (strain_true.png) and both as strain.csv; flat faces"),
     OPT_JSON(json),
     OPT_GROUP("The scanner"),
     OPT_TEXT(
@@ -191,75 +195,105 @@ static void measure_drawn(options *o, const settled *s, const sonde_echo *echo) 
   }
 }
 
+// What a run makes, and what it is made of.
+typedef struct drawing {
+  settled s;
+  sonde_echo *echo;
+  sonde_image image;
+  sonde_pathology pathology;
+  double aperture_m;
+} drawing;
+
+// Presses, draws and writes the picture and its truth.
+static sonde_status draw(options *o, drawing *d, sonde_error *error) {
+  sonde_scanner scanner;
+  sonde_status status = choose_scanner(o, &scanner, error);
+  if (!status) status = sonde_pathology_preset(o->pathology, &d->pathology, error);
+  if (!status) status = settled_open(&d->s, o->model, o->probe, NULL, true, error);
+  if (!status) status = place(&d->s, o, error);
+  if (status) return status;
+  sonde_echo_def def = sonde_echo_def_default();
+  def.seed = (uint64_t)o->seed;
+  def.scanner = &scanner;
+  const double radius = isnan(o->radius_m) ? 0 : o->radius_m;
+  d->aperture_m = isnan(o->aperture_m) ? 2 * d->s.probe.half_x_m : o->aperture_m;
+  settled_update(&d->s, &d->pathology, 0, sonde_state_tick(d->s.state));
+  status = sonde_echo_check_view(d->aperture_m, radius, error);
+  if (!status && o->strain && radius > 0)
+    status =
+        app_error(error, SONDE_ARGUMENT,
+                  "--strain expects a flat face, this one has a radius of %g mm", 1e3 * radius);
+  if (!status) status = sonde_echo_create(d->s.interior, &def, &d->echo, error);
+  if (!status) status = sonde_echo_set_radius(d->echo, radius, error);
+  if (!status)
+    status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &d->image, error);
+  if (status) return status;
+  sonde_echo_render(d->echo, d->s.pose, d->aperture_m, &d->pathology, &o->settings, &d->image);
+  const uint32_t lost = sonde_echo_last_times(d->echo).lost;
+  if (lost) fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
+  status = sonde_image_save_png(&d->image, o->out, error);
+  measure_drawn(o, &d->s, d->echo);
+  if (!status && o->truth)
+    status = image_truth_write(o->truth, d->echo, d->s.interior, &d->image, error);
+  return status;
+}
+
+// What the picture shows; the strain last, for which the probe goes on.
+static sonde_status report(options *o, drawing *d, sonde_error *error) {
+  sonde_vessel_state vein, artery;
+  const bool v = sonde_interior_vessel_at_plane(d->s.interior, 0, d->s.pose, &vein);
+  const bool a = sonde_interior_vessel_at_plane(d->s.interior, 1, d->s.pose, &artery);
+  if (!o->json) {
+    printf("%s: %.0f x %.0f pixels, %.1f x %.1f mm, %.2f N\n", o->out, o->size[0], o->size[1],
+           d->image.width_m * 1e3, d->image.height_m * 1e3, d->s.force_n);
+    if (v)
+      printf("vein   %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * vein.half_short_m,
+             100 * vein.area_ratio);
+    if (a)
+      printf("artery %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * artery.half_short_m,
+             100 * artery.area_ratio);
+    settled_branches(&d->s, false);
+  } else {
+    app_json_begin();
+    app_json("image:%s width_mm:%g height_mm:%g force_n:%g", o->out, d->image.width_m * 1e3,
+             d->image.height_m * 1e3, d->s.force_n);
+    settled_json_jumps(&d->s);
+    app_json("case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
+             o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
+             a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
+    app_json("vein_drawn_mm:%g artery_drawn_mm:%g", v ? 1e3 * o->drawn_m[0] : NAN,
+             a ? 1e3 * o->drawn_m[1] : NAN);
+    settled_branches(&d->s, true);
+  }
+  image_strain strain = {.echo = d->echo,
+                         .pathology = &d->pathology,
+                         .settings = &o->settings,
+                         .aperture_m = d->aperture_m,
+                         .image = &d->image};
+  sonde_status status = SONDE_OK;
+  if (o->strain) status = image_strain_write(o->strain, &d->s, &strain, error);
+  if (o->strain && !status && o->json)
+    app_json("strain_mean:%g strain_error_rms:%g strain_tracked_share:%g", strain.mean,
+             strain.error, strain.tracked);
+  else if (o->strain && !status)
+    printf("strain %.2f %% in the mean, tracked within %.2f %% rms at %.0f %% of the places\n",
+           100 * strain.mean, 100 * strain.error, 100 * strain.tracked);
+  if (o->json) app_json_end();
+  return status;
+}
+
 static int run(void *from) {
   options *o = from;
   assert(o->out && o->size[0] > 0 && o->size[1] > 0);
-  settled s = {0};
-  sonde_image image = {0};
-  sonde_pathology pathology;
+  drawing d = {0};
   sonde_error error = {0};
   app_progress_begin("pressing and drawing");
-  sonde_scanner scanner;
-  sonde_status status = choose_scanner(o, &scanner, &error);
-  if (!status) status = sonde_pathology_preset(o->pathology, &pathology, &error);
-  if (!status) status = settled_open(&s, o->model, o->probe, NULL, true, &error);
-  if (!status) status = place(&s, o, &error);
-  if (!status) {
-    sonde_echo *echo = NULL;
-    sonde_echo_def def = sonde_echo_def_default();
-    def.seed = (uint64_t)o->seed;
-    def.scanner = &scanner;
-    double aperture = isnan(o->aperture_m) ? 2 * s.probe.half_x_m : o->aperture_m;
-    settled_update(&s, &pathology, 0, sonde_state_tick(s.state));
-    status = sonde_echo_check_view(aperture, isnan(o->radius_m) ? 0 : o->radius_m, &error);
-    if (!status) status = sonde_echo_create(s.interior, &def, &echo, &error);
-    if (!status) status = sonde_echo_set_radius(echo, isnan(o->radius_m) ? 0 : o->radius_m, &error);
-    if (!status)
-      status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &image, &error);
-    if (!status) {
-      sonde_echo_render(echo, s.pose, aperture, &pathology, &o->settings, &image);
-      uint32_t lost = sonde_echo_last_times(echo).lost;
-      if (lost)
-        fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
-      status = sonde_image_save_png(&image, o->out, &error);
-      measure_drawn(o, &s, echo);
-      if (!status && o->truth)
-        status = image_truth_write(o->truth, echo, s.interior, &image, &error);
-    }
-    sonde_echo_destroy(echo);
-  }
+  sonde_status status = draw(o, &d, &error);
   app_progress_end();
-  if (!status) {
-    sonde_vessel_state vein, artery;
-    bool v = sonde_interior_vessel_at_plane(s.interior, 0, s.pose, &vein);
-    bool a = sonde_interior_vessel_at_plane(s.interior, 1, s.pose, &artery);
-    if (!o->json) {
-      printf("%s: %.0f x %.0f pixels, %.1f x %.1f mm, %.2f N\n", o->out, o->size[0], o->size[1],
-             image.width_m * 1e3, image.height_m * 1e3, s.force_n);
-      if (v)
-        printf("vein   %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * vein.half_short_m,
-               100 * vein.area_ratio);
-      if (a)
-        printf("artery %.1f mm front to back, %.0f %% of its rest area\n",
-               2e3 * artery.half_short_m, 100 * artery.area_ratio);
-      settled_branches(&s, false);
-    } else {
-      app_json_begin();
-      app_json("image:%s width_mm:%g height_mm:%g force_n:%g", o->out, image.width_m * 1e3,
-               image.height_m * 1e3, s.force_n);
-      settled_json_jumps(&s);
-      app_json(
-          "case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
-          o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
-          a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
-      app_json("vein_drawn_mm:%g artery_drawn_mm:%g", v ? 1e3 * o->drawn_m[0] : NAN,
-               a ? 1e3 * o->drawn_m[1] : NAN);
-      settled_branches(&s, true);
-      app_json_end();
-    }
-  }
-  sonde_image_clear(&image);
-  settled_close(&s);
+  if (!status) status = report(o, &d, &error);
+  sonde_echo_destroy(d.echo);
+  sonde_image_clear(&d.image);
+  settled_close(&d.s);
   return status ? app_fail("image", &error) : APP_OK;
 }
 
