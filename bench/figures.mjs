@@ -40,6 +40,10 @@ const spread = (runs, of) => {
   return { least: all[0], median: all[all.length >> 1], most: all[all.length - 1] }
 }
 
+// A script under the system's interpreter with the package of the build.
+const python = (bin, ...options) =>
+  JSON.parse(execFileSync('/usr/bin/python3', options, { encoding: 'utf8', cwd: HOME, maxBuffer: 1 << 26,
+    env: { ...process.env, PYTHONPATH: [join(bin, '..', 'python'), join(HOME, '..', 'shared', 'peers', 'python'), process.env.PYTHONPATH ?? ''].join(':') } }))
 const json = (bin, ...options) => JSON.parse(run(bin, 'sonde', ...options, '--json'))
 const engine = ['src/sonde/world', 'src/sonde/tissue', 'src/sonde/sparse']
 const thigh = ['--surface', 'data/thigh/skin.ply', '--sites', 'data/thigh/sites.csv']
@@ -136,6 +140,14 @@ const GROUPS = {
       }
       return values
     },
+  },
+  batch: {
+    sources: ['src/sonde-exam/batch', 'src/sonde/interior', 'bench/batch.py', ...engine],
+    measure: bin => python(bin, 'bench/batch.py').values,
+  },
+  learner: {
+    sources: ['src/sonde-exam/batch', 'python/sonde/gym.py', 'python/examples/learn_reach.py'],
+    measure: bin => python(bin, 'python/examples/learn_reach.py', '--json'),
   },
   image: {
     sources: ['src/sonde/echo', 'src/sonde/interior'],
@@ -242,6 +254,12 @@ const fixed = (value, decimals) => value.toLocaleString('en-US', { minimumFracti
 
 // What the blocks of the documents show, from the groups' values; undefined where a group is not measured.
 const BLOCKS = {
+  learner({ learner }) {
+    const share = value => value.toFixed(2)
+    return ['| pictures that the learner saw | episodes that reach the vein |', '|---|---|',
+      ...learner.curve.map(([pictures, reached]) => `| ${pictures} | ${share(reached)} |`),
+      `| chance | ${share(learner.random)} |`, `| scripted operator that knows the vein's place | ${share(learner.scripted)} |`].join('\n')
+  },
   fit_errors({ fit }) {
     const rows = [
       ['stage 1, every curve by itself', fit.stage1.parameters, fit.stage1],

@@ -28,6 +28,7 @@ build_packages() {
   need_library yaml-0.1 libyaml-dev
   need_library - libnifti2-dev # no pkg-config file
   need_library zlib zlib1g-dev
+  installed python3-dev || missing+=(python3-dev) # the package for Python
   need_command node nodejs
   if ! has npm; then missing+=(npm ca-certificates); fi
 }
@@ -50,6 +51,11 @@ test_packages() {
   has chromium || has google-chrome || missing+=(chromium)
   need_command mandoc mandoc
   need_command teem-unu teem-apps
+  installed python3-numpy || missing+=(python3-numpy)
+  installed python3-setuptools || missing+=(python3-setuptools)
+  installed python3-wheel || missing+=(python3-wheel)
+  installed python3-cloudpickle || missing+=(python3-cloudpickle) # of Gymnasium, where it is there
+  installed python3-typing-extensions || missing+=(python3-typing-extensions)
   installed python3-vtk9 || missing+=(python3-vtk9) # reads MetaImage and NRRD files as others do
 }
 

@@ -1,5 +1,6 @@
 // One tick of a session. Nothing here or below it allocates, locks, prints or waits.
 #include "exam/session.h"
+#include "exam/vessels.h"
 
 #include "base/base.h"
 #include "base/clock.h"
@@ -40,34 +41,12 @@ void sonde_session_offer(sonde_session *session) {
   unsigned char *slot = sonde_mailbox_write_slot(session->surface_box);
   sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
   sonde_snapshot *snapshot = &head->snapshot;
-  const sonde_contact *contact = sonde_state_contact(session->state);
-  sonde_pose pose = session->sample.world_from_probe;
-  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
-  *snapshot = (sonde_snapshot){
-      .tick = sonde_state_tick(session->state),
-      .time_s = sonde_state_time(session->state),
-      .world_from_probe = pose,
-      .probe = session->controls.probe,
-      .force_n = contact->force_n,
-      .rendered_force_n = session->safety.force_n,
-      .force_normal_n = -v_dot(contact->force_n, axis),
-      .penetration_m = (double)NAN,
-      .contact_volume_m3 = contact->volume_m3,
-      .contact_area_m2 = contact->area_m2,
-      .vein_area_ratio = (double)NAN,
-      .artery_area_ratio = (double)NAN,
-      .other_vein_ratio = (double)NAN,
-      .vein_short_m = (double)NAN,
-      .vein_rest_m = vec3((double)NAN, (double)NAN, (double)NAN),
-      .vein_tilt_rad = (double)NAN,
-      .gel_volume_m3 = (double)NAN,
-      .gel_coupling = (double)NAN,
-      .awake_nodes = sonde_state_awake(session->state),
-      .solver_iterations = sonde_state_solver(session->state).iterations,
-      .flags = sonde_subject_flags(session->subject),
-      .restores = session->subject->now.restores,
-      .fault = session->safety.fault,
-  };
+  *snapshot = sonde_snapshot_of(session->state, session->sample.world_from_probe);
+  snapshot->probe = session->controls.probe;
+  snapshot->rendered_force_n = session->safety.force_n;
+  snapshot->flags = sonde_subject_flags(session->subject);
+  snapshot->restores = session->subject->now.restores;
+  snapshot->fault = session->safety.fault;
   head->controls = session->controls;
   head->pathology = sonde_subject_pathology(session->subject);
   head->circulation = session->subject->now.circulation;

@@ -33,21 +33,7 @@ void sonde_bench_step(sonde_bench *bench, sonde_pose probe) {
 
 sonde_snapshot sonde_bench_look(sonde_bench *bench, sonde_pose probe) {
   SONDE_ASSERT(bench->looked_tick <= bench->tick);
-  const double nan_m = (double)NAN;
-  const sonde_contact *contact = sonde_state_contact(bench->state);
-  sonde_vec3 beam = q_rotate(probe.rotation, vec3(0, 0, 1));
-  sonde_snapshot s = {.tick = bench->tick,
-                      .time_s = (double)bench->tick * BENCH_STEP_S,
-                      .world_from_probe = probe,
-                      .force_n = contact->force_n,
-                      .force_normal_n = -v_dot(contact->force_n, beam),
-                      .penetration_m = nan_m,
-                      .vein_area_ratio = nan_m,
-                      .artery_area_ratio = nan_m,
-                      .other_vein_ratio = nan_m,
-                      .vein_short_m = nan_m,
-                      .vein_rest_m = {nan_m, nan_m, nan_m},
-                      .vein_tilt_rad = nan_m};
+  sonde_snapshot s = sonde_snapshot_of(bench->state, probe);
   bool pressing = s.force_normal_n > TOUCH_N && s.force_normal_n < FORCE_MAX_N;
   sonde_pathology pathology = bench->pathology;
   sonde_circulation_apply(&bench->circulation, bench->tick, BENCH_STEP_S, &pathology);

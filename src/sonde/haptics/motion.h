@@ -12,12 +12,13 @@
 // rotation.
 SONDE_LINK bool sonde_pose_usable(sonde_pose pose);
 // Angle of the rotation that takes a to b along the short arc, 0..pi.
-double sonde_quat_angle(sonde_quat a, sonde_quat b);
+SONDE_LINK double sonde_quat_angle(sonde_quat a, sonde_quat b);
 // Along the short arc from a (t = 0) to b (t = 1).
 SONDE_LINK sonde_quat sonde_quat_slerp(sonde_quat a, sonde_quat b, double t);
 // From a towards b by a share t of the way, position straight and rotation along the short arc.
 sonde_pose sonde_pose_blend(sonde_pose a, sonde_pose b, double t);
 // From a towards b by at most `reach_m` and `rotation_rad`; arrives exactly.
-sonde_pose sonde_pose_approach(sonde_pose a, sonde_pose b, double reach_m, double rotation_rad);
+SONDE_LINK sonde_pose sonde_pose_approach(sonde_pose a, sonde_pose b, double reach_m,
+                                          double rotation_rad);
 
 #endif
