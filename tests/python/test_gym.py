@@ -1,6 +1,7 @@
 """The environments before Gymnasium's own checker, and their laws. Gymnasium is not a package of Debian 12: without
 it beside the sources, or installed, the test is skipped and says so."""
 import os
+import pathlib
 import sys
 import tempfile
 import unittest
@@ -57,11 +58,11 @@ class Gym(unittest.TestCase):
     def test_an_exam_passes_the_checker_and_can_be_won(self):
         with tempfile.TemporaryDirectory() as folder:
             case, protocol = os.path.join(folder, "gym.yaml"), os.path.join(folder, "one.yaml")
-            open(case, "w").write(CASE)
-            open(protocol, "w").write(PROTOCOL)
+            pathlib.Path(case).write_text(CASE)
+            pathlib.Path(protocol).write_text(PROTOCOL)
             env = gymnasium.make("sonde/ThreePointExam-v0", case=case, protocol=protocol,
                                  images=False, disable_env_checker=True).unwrapped
-        check_env(env, skip_render_check=True)
+            check_env(env, skip_render_check=True)
         seen, _ = env.reset(seed=2)
         total, firm = 0.0, seen["firm_n"][0]
         over = False

@@ -2,6 +2,7 @@
 import gc
 import json
 import os
+import pathlib
 import subprocess
 import sys
 import tempfile
@@ -113,7 +114,7 @@ class Package(unittest.TestCase):
         self.assertEqual(len(fitted["sites"]), 64)
         self.assertEqual(fitted["parameters"], 256)
         self.assertLess(fitted["errors"]["mae_percent"], 2)
-        rows = open(f"{data}/indentation.csv").read().splitlines()
+        rows = pathlib.Path(data, "indentation.csv").read_text().splitlines()
         with tempfile.NamedTemporaryFile("w", suffix=".csv") as few:
             head = next(r for r in rows if r.startswith("site,"))
             some = [r for r in rows if r.startswith("27,linear,")]
