@@ -12,7 +12,7 @@
 #include <string.h>
 
 typedef struct options {
-  const char *model, *probe, *pathology, *out, *scanner, *truth, *strain;
+  const char *model, *probe, *pathology, *out, *scanner, *truth, *strain, *station;
   double numbers[7], size[2]; // of the pose as typed; pixels
   sonde_pose pose;
   bool posed, json;
@@ -24,7 +24,8 @@ typedef struct options {
 } options;
 
 static void prepare(void *to) {
-  *(options *)to = (options){.probe = "linear",
+  *(options *)to = (options){.site = -1,
+                             .probe = "linear",
                              .pathology = "healthy",
                              .scanner = "venous",
                              .size = {512, 512},
@@ -51,7 +52,9 @@ static const app_option TABLE[] = {
     OPT_MODEL(model),
     OPT_NUMBERS(numbers, "pose", "X,Y,Z,QW,QX,QY,QZ", -INFINITY, INFINITY,
                 "world from probe: mm, each -2000 to 2000, and unit quaternion; z is the beam"),
-    OPT_INTEGER(site, "site", "K", 0, 1000000, "above this site of the model instead"),
+    OPT_TEXT(station, "station", "NAME",
+             "at a station of the model, such as popliteal; default its first one"),
+    OPT_INTEGER(site, "site", "K", 0, 1000000, "at the site of this number instead"),
     OPT_REAL(turn_rad, "turn-deg", "A", -180, 180, 3.14159265358979323846 / 180,
              "about the beam; 90 looks along the leg"),
     OPT_REAL(force_n, "force-n", "F", 0.01, 200, 1,
@@ -125,6 +128,8 @@ static int check(void *from) {
   double *v = o->numbers;
   double norm = sqrt(v[3] * v[3] + v[4] * v[4] + v[5] * v[5] + v[6] * v[6]);
   o->posed = app_option_given("pose");
+  if (o->posed + app_option_given("site") + app_option_given("station") > 1)
+    return app_usage_error("image", "give one of --pose, --site and --station");
   if (o->posed && !(fabs(norm * norm - 1) < 1e-2))
     return app_usage_error("image", "--pose expects a unit quaternion QW,QX,QY,QZ, got one of %g",
                            norm);
@@ -144,7 +149,9 @@ static int check(void *from) {
 
 static sonde_status place(settled *s, const options *o, sonde_error *error) {
   sonde_pose start = o->pose;
-  sonde_status status = o->posed ? SONDE_OK : settled_site(s, o->model, o->site, &start, error);
+  char at[64];
+  sonde_status status =
+      o->posed ? SONDE_OK : settled_place(s, o->model, o->site, o->station, &start, at, error);
   if (status) return status;
   // The probe turns about its own beam.
   double c = cos(0.5 * o->turn_rad), h = sin(0.5 * o->turn_rad);
@@ -300,7 +307,7 @@ static int run(void *from) {
 const app_command cmd_image = {
     .verb = "image",
     .summary = "write the echographic picture of a model at a pose",
-    .usage = "[MODEL] (--pose X,Y,Z,QW,QX,QY,QZ | --site K) -o PNG [options]",
+    .usage = "[MODEL] [--station NAME | --site K | --pose X,Y,Z,QW,QX,QY,QZ] -o PNG [options]",
     .text = "Writes the echographic picture that a probe sees on a model at rest or pressed, and "
             "tells what it shows. Without --force-n and --press-mm the skin stays at rest.",
     OPT_TABLE(TABLE),
@@ -308,7 +315,6 @@ const app_command cmd_image = {
     .size = sizeof(options),
     .prepare = prepare,
     .required = "o",
-    .one_of = "pose site",
     .not_both = "force-n press-mm",
     .check = check,
     .run = run};

@@ -33,8 +33,10 @@ static const app_option TABLE[] = {
     OPT_INTEGER(seed, "seed", "N", 0, 4294967295, "of what is drawn"),
     OPT_WORD(sex, "sex", "SEX", SEXES, "sex; default drawn"),
     OPT_WORD(side, "side", "SIDE", SIDES, "side; a left limb is the mirror of a right one"),
-    OPT_WORD(position, "position", "NAME", POSITIONS,
-             "position of the view, the skin, the film and the stations; default at rest"),
+    OPT_WORD(
+        position, "position", "NAME", POSITIONS,
+        "position of the view, the skin, the film, the stations and the model; default straight, "
+        "lying"),
     OPT_FLAG(stations, "stations", "list the stations of an examination too"),
     OPT_TEXT(atlas, "atlas", "DIR",
              "write labelled sections and a view as SVG, and a table, into a directory"),
@@ -282,7 +284,9 @@ static int run(void *from) {
   }
   if (!status && a->film) status = limb_film_write(limb, pose, a->film, &error);
   sonde_model *model = NULL;
-  const sonde_limb_model_def def = sonde_limb_model_def_default();
+  sonde_limb_model_def def = sonde_limb_model_def_default();
+  sonde_limb_setting setting;
+  if (pose) setting = sonde_limb_pose_setting(pose), def.setting = &setting;
   if (!status && a->model) status = sonde_limb_model(&body, &def, &model, &error);
   if (!status && a->model) status = sonde_model_save(model, a->model, &error);
   sonde_model_destroy(model);

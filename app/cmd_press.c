@@ -10,14 +10,15 @@ static const double PA_PER_MMHG = 133.322387415;
 static const double CUFF_MOST_PA = 300 * 133.322387415, CLOSED = 0.05, CUFF_LIFT_M = 0.005;
 
 typedef struct options {
-  const char *model, *probe, *pathology, *image, *preset;
-  long site;
+  const char *model, *probe, *pathology, *image, *preset, *station;
+  long site;               // -1: at the station
   double force_n, depth_m; // NaN when not asked for, as all below
   double cuff_pa, vein_depth_m, venous_pa, thrombus_pa, wall_pa, sheath;
   bool json;
 } options;
 
-static const options DEFAULTS = {.probe = "linear",
+static const options DEFAULTS = {.site = -1,
+                                 .probe = "linear",
                                  .pathology = "healthy",
                                  .force_n = NAN,
                                  .depth_m = NAN,
@@ -30,7 +31,9 @@ static const options DEFAULTS = {.probe = "linear",
 
 static const app_option TABLE[] = {
     OPT_MODEL(model),
-    OPT_INTEGER(site, "site", "K", 0, 1000000, "number of the site to press at"),
+    OPT_TEXT(station, "station", "NAME",
+             "where to press: a station of the model, such as popliteal; default its first one"),
+    OPT_INTEGER(site, "site", "K", 0, 1000000, "at the site of this number instead"),
     OPT_TEXT(probe, "probe", "NAME|FILE",
              "point, linear, square, sphere, or a mesh file in millimetres"),
     OPT_REAL(force_n, "force-n", "F", 0.01, 200, 1, "press until the settled force is F newtons"),
@@ -58,7 +61,8 @@ static const app_option TABLE[] = {
 
 typedef struct press {
   settled scene;
-  sonde_pose start; // at rest on the site
+  sonde_pose start; // at rest on the site or station
+  char at[64];      // what it is called
   sonde_pathology pathology;
   double vein_depth_m;          // NaN: where the model has it
   double closes_pa;             // cuff that closes the vein; NaN: none does, or no cuff
@@ -103,11 +107,15 @@ static void print(const press *p, const options *o) {
              p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN, s->result.residual, s->iterations);
     if (s->interior) settled_branches(s, true);
     settled_json_jumps(s);
-    app_json("case:%s probe:%s site:%ld", p->pathology.name, s->probe.name, o->site);
+    app_json("case:%s probe:%s", p->pathology.name, s->probe.name);
+    if (o->site >= 0)
+      app_json("site:%ld", o->site);
+    else
+      app_json("station:%s", p->at);
     app_json_end();
     return;
   }
-  printf("site %ld, probe %s, case %s\n", o->site, s->probe.name, p->pathology.name);
+  printf("%s, probe %s, case %s\n", p->at, s->probe.name, p->pathology.name);
   printf("force         %8.3f N\n", s->force_n);
   printf("penetration   %8.2f mm\n", s->depth_m * 1e3);
   printf("residual      %8.1e of the contact force (%u steps)\n", s->result.residual,
@@ -172,7 +180,8 @@ static int run(void *from) {
                  !isnan(o->wall_pa) || !isnan(o->thrombus_pa) || !isnan(o->sheath) || cuff;
   app_progress_begin("pressing");
   if (!status) status = settled_open(&p.scene, o->model, o->probe, &preset, vessels, &error);
-  if (!status) status = settled_site(&p.scene, o->model, o->site, &p.start, &error);
+  if (!status)
+    status = settled_place(&p.scene, o->model, o->site, o->station, &p.start, p.at, &error);
   if (!status) {
     double depth_m = cuff ? -CUFF_LIFT_M : o->depth_m;
     status = !isnan(o->force_n) ? settled_force(&p.scene, p.start, o->force_n, &error)
@@ -215,13 +224,13 @@ static int run(void *from) {
 const app_command cmd_press = {
     .verb = "press",
     .summary = "press once, settle, report force, penetration and vessels",
-    .usage =
-        "[MODEL] --site K --probe NAME|FILE (--force-n F | --depth-mm D | --cuff-mmhg P) [options]",
+    .usage = "[MODEL] [--station NAME | --site K] (--force-n F | --depth-mm D | --cuff-mmhg P) "
+             "[options]",
     .text = "Presses a probe on the thigh until everything is at rest and reports the force, the "
             "penetration and the state of the vein and the artery below it.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .defaults = &DEFAULTS,
-    .required = "site",
     .one_of = "force-n depth-mm cuff-mmhg",
+    .not_both = "station site",
     .run = run};

@@ -42,6 +42,58 @@ sonde_status settled_site(const settled *s, const char *model, long number, sond
                    number, s->model->site_count);
 }
 
+// Whether a station is meant by what was typed: its name or its first letters, '-' and ' ' as '_'.
+static bool begins(const char *name, const char *typed) {
+  for (; *typed; ++name, ++typed) {
+    char c = *typed == '-' || *typed == ' ' ? '_' : *typed;
+    if (c >= 'A' && c <= 'Z') c = (char)(c - 'A' + 'a');
+    if (c != *name) return false;
+  }
+  return true;
+}
+
+sonde_status settled_place(const settled *s, const char *model, long number, const char *station,
+                           sonde_pose *above, char at[64], sonde_error *error) {
+  const sonde_thigh_anatomy *a = s->model->anatomy;
+  const uint32_t count = a ? a->landmark_count : 0;
+  snprintf(at, 64, "site %ld", number);
+  if (number >= 0) return settled_site(s, model, number, above, error);
+  if (count == 0)
+    return app_error(error, SONDE_NOT_FOUND,
+                     "%.400s names no stations: give --site K, one of its %u sites", model,
+                     s->model->site_count);
+  const sonde_landmark *found = station ? NULL : &a->landmark[0];
+  uint32_t meant = 0;
+  for (uint32_t k = 0; station && k < count; ++k) {
+    if (!begins(a->landmark[k].name, station)) continue;
+    if (meant++ == 0 || strlen(a->landmark[k].name) == strlen(station)) found = &a->landmark[k];
+  }
+  if (meant > 1 && strlen(found->name) != strlen(station)) found = NULL; // several begin so
+  const sonde_site *site = found ? sonde_model_site(s->model, found->site) : NULL;
+  if (!site) {
+    char list[400] = "";
+    for (uint32_t k = 0; k < count; ++k) {
+      size_t used = strlen(list);
+      snprintf(list + used, sizeof list - used, "%s%s", k ? ", " : "", a->landmark[k].name);
+    }
+    return app_error(error, SONDE_NOT_FOUND, "no station '%.60s', expected one of %s",
+                     station ? station : found->name, list);
+  }
+  // As at the nearest site, but over the vein itself.
+  sonde_site here = *site;
+  const sonde_vec3 n = found->normal, u = site->u;
+  const double out = vec_dot(u, n);
+  here.position_m = found->skin_m, here.normal = n;
+  sonde_vec3 across = {u.x - out * n.x, u.y - out * n.y, u.z - out * n.z};
+  const double size = sqrt(vec_dot(across, across));
+  here.u = (sonde_vec3){across.x / size, across.y / size, across.z / size};
+  here.v = (sonde_vec3){n.y * here.u.z - n.z * here.u.y, n.z * here.u.x - n.x * here.u.z,
+                        n.x * here.u.y - n.y * here.u.x};
+  *above = sonde_site_pose(&here, 0);
+  snprintf(at, 64, "%s", found->name);
+  return SONDE_OK;
+}
+
 bool settled_on_skin(const settled *s, sonde_pose *pose) {
   const double back_m = 0.1, reach_m = 0.3;
   sonde_error error = {0};

@@ -26,6 +26,10 @@ void settled_close(settled *s);
 // A site of the model, and the pose at rest there. @return SONDE_NOT_FOUND naming the model's file
 sonde_status settled_site(const settled *s, const char *model, long number, sonde_pose *above,
                           sonde_error *error);
+// The same at a station of the model by name or by the first letters of it ("popliteal"); NULL: at
+// its first one. `number` 0 or more: at that site instead. @param[out] at what is said of the place
+sonde_status settled_place(const settled *s, const char *model, long number, const char *station,
+                           sonde_pose *above, char at[64], sonde_error *error);
 // Where a pose's beam meets the rest skin, the pose moved there; false when it misses.
 bool settled_on_skin(const settled *s, sonde_pose *pose);
 // Settles with the face `depth_m` along the beam from `start`, hardly moved since the last

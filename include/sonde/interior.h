@@ -36,7 +36,8 @@ typedef enum sonde_label {
 /** State of the vein that a case prescribes. */
 typedef struct sonde_pathology {
   char name[32];
-  double venous_pressure_pa; /**< lumen pressure; 10 mmHg supine */
+  double venous_pressure_pa; /**< in the lumen; 10 mmHg supine. A model's own position
+                                (sonde_model.gravity) adds to it */
   double arterial_pressure_pa;
   double thrombus_fraction;              /**< solid share of the rest lumen, 0..1 */
   double thrombus_modulus_pa;            /**< Young's modulus of the solid */
@@ -103,14 +104,6 @@ SONDE_API sonde_status sonde_interior_set_vein_depth(sonde_interior *interior,
                                                      sonde_vec3 below_skin_m, double depth_m,
                                                      sonde_error *error);
 
-/** Posture of the leg. */
-typedef enum sonde_posture {
-  SONDE_POSTURE_SUPINE,
-  SONDE_POSTURE_SITTING,
-  SONDE_POSTURE_STANDING,
-  SONDE_POSTURE_COUNT
-} sonde_posture;
-
 /** What one update reads; all borrowed for the call. */
 typedef struct sonde_interior_input {
   const sonde_vec3 *positions_m;      /**< [nodes] deformed skin */
@@ -124,7 +117,8 @@ typedef struct sonde_interior_input {
    */
   double face_half_x_m, face_half_y_m;
   double cuff_pa; /**< uniform pressure on every vessel from outside, beside the probe's */
-  /** Of a limb: blood's own weight raises the groin's pressures below it. */
+  /** Of a limb: blood's own weight raises the groin's pressures below it. A model that says how it
+   * lies (sonde_model.gravity) keeps to that. */
   sonde_posture posture;
 } sonde_interior_input;
 

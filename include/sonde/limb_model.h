@@ -9,7 +9,8 @@
 #ifndef SONDE_LIMB_MODEL_H
 #define SONDE_LIMB_MODEL_H
 
-#include "sonde/limb_vessels.h"
+#include "sonde/limb_pose.h"
+#include "sonde/tissue.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -22,6 +23,8 @@ typedef struct sonde_limb_model_def {
   double fine_edge_m; /**< along the main vein and at the stations; default 3 mm */
   double stiffness;   /**< of the soft tissue, 0.2 to 5; 1: that of the bundled thigh */
   double damping_s;   /**< time of the normal dampers; 20 ms */
+  /** NULL: the straight limb, lying; else in this position, whose pressures its veins have */
+  const sonde_limb_setting *setting;
 } sonde_limb_model_def;
 SONDE_API sonde_limb_model_def sonde_limb_model_def_default(void); /**< @thread any */
 
@@ -29,7 +32,8 @@ SONDE_API sonde_limb_model_def sonde_limb_model_def_default(void); /**< @thread 
  * Makes the limb of a drawn body and its model. Vein: external iliac to popliteal; artery likewise;
  * all other vessels are branches, with '_' for ' ' in their names. Landmarks and sites 0 to 14 are
  * the stations; further sites stand along the main vein. Springs follow from the layers below each
- * node, tendon being stiffer than muscle.
+ * node, tendon being stiffer than muscle. In a position (limb_pose.h) all of it is that of the
+ * posed limb; vessels keep the radius of 10 mmHg, which the interior changes with their pressure.
  * @param[out] model owned by the caller; owns the limb
  * @return ARGUMENT for a body without room for muscle or a def out of range; MESH
  * @thread owner
@@ -44,7 +48,11 @@ SONDE_API sonde_status sonde_limb_model_load(const char *path, sonde_model **mod
                                              sonde_error *error);
 /** The limb of such a model, NULL of any other; the model's. @thread any */
 SONDE_API const sonde_limb *sonde_limb_of(const sonde_model *model);
-/** A point of the limb's frame in the model's, or the other way. @thread any */
+/** The position of such a limb, NULL of a straight one or any other model; the model's.
+ *  @thread any */
+SONDE_API const sonde_limb_pose *sonde_limb_pose_of(const sonde_model *model);
+/** A point of the limb's frame, posed when the limb is, in the model's, or the other way.
+ *  @thread any */
 SONDE_API sonde_vec3 sonde_limb_to_model(const sonde_limb *limb, sonde_vec3 point_m);
 
 #ifdef __cplusplus

@@ -10,7 +10,7 @@
 #ifndef SONDE_TISSUE_H
 #define SONDE_TISSUE_H
 
-#include "sonde/geometry.h"
+#include "sonde/tissue_gravity.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -130,21 +130,21 @@ typedef struct sonde_model {
   sonde_mesh femur;        /**< closed; of a limb all its bones */
   sonde_vec3 *bone_axis_m; /**< NULL, or [bone_axis_count] middles of the bones of a limb */
   uint32_t bone_axis_count, map_origin_count;
+  sonde_gravity gravity; /**< of a limb in a position */
   sonde_surface_law law;
-  sonde_vec3 *normal;               /**< [nodes] outward rest normals */
-  double *area_m2;                  /**< [nodes] */
-  double *mass_kg;                  /**< [nodes] */
-  double *k0_n_m3;                  /**< [nodes] per area */
-  double *xm_m;                     /**< [nodes] */
-  double *shear_share;              /**< [nodes] G here over the law's; a face takes the mean */
-  double *limit_share;              /**< [nodes] gm here over the law's; likewise */
-  double *fat_depth_m;              /**< [nodes] depth of the skin/fat interface below the skin */
-  double *muscle_depth_m;           /**< [nodes] depth of the fat/muscle interface */
-  double *bone_depth_m;             /**< [nodes] distance to the femur */
-  double *edge_rest_m;              /**< [edges] */
-  double *edge_share;               /**< [edges] share of the surface spring that the edge carries:
-                                         1/2 on the lips of a cut; NULL: all of it everywhere */
-  double *face_area_m2;             /**< [faces] */
+  sonde_vec3 *normal;     /**< [nodes] outward rest normals */
+  double *area_m2;        /**< [nodes] */
+  double *mass_kg;        /**< [nodes] */
+  double *k0_n_m3;        /**< [nodes] per area */
+  double *xm_m;           /**< [nodes] */
+  double *shear_share;    /**< [nodes] G here over the law's; a face takes the mean */
+  double *limit_share;    /**< [nodes] gm here over the law's; likewise */
+  double *fat_depth_m;    /**< [nodes] depth of the skin/fat interface below the skin */
+  double *muscle_depth_m; /**< [nodes] depth of the fat/muscle interface */
+  double *bone_depth_m;   /**< [nodes] distance to the femur */
+  double *edge_rest_m;    /**< [edges] */
+  double *edge_share;     /**< [edges] share of the surface spring: 1/2 on lips; NULL: 1 */
+  double *face_area_m2;   /**< [faces] */
   double (*face_half_cotangent)[3]; /**< [faces] of the angle at each corner */
   uint32_t (*face_edge)[3];         /**< [faces] edge opposite each corner */
   uint32_t site_count;

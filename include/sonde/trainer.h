@@ -177,17 +177,17 @@ typedef struct sonde_case {
   char note[1024];    /**< for teaching, after the exam */
   sonde_case_thigh thigh;
   uint64_t seed;
-  sonde_thigh known;   /**< parameters that are not drawn */
-  sonde_limb_body leg; /**< the same of a limb */
+  sonde_thigh known;            /**< parameters that are not drawn */
+  sonde_limb_body leg;          /**< the same of a limb */
+  sonde_limb_position position; /**< of the leg; SONDE_LIMB_POSITIONS: straight, lying */
   char model[256];
   sonde_circulation circulation;
   sonde_pathology pathology; /**< of the femoral vein; extent below */
   sonde_case_extent extent;
-  uint32_t lesion_count, branch_count;
+  uint32_t lesion_count, branch_count, truth_count;
   sonde_case_lesion lesion[SONDE_LESIONS];
   sonde_case_branch branch[SONDE_BRANCHES];
   double webs, oedema;
-  uint32_t truth_count;
   char truth_segment[SONDE_SEGMENTS][32];
   sonde_decision truth[SONDE_SEGMENTS]; /**< compressible or clot */
   bool thrombosis;                      /**< of a deep vein, of the calf too: the diagnosis */

@@ -93,6 +93,8 @@ rejects 'nowhere\.sonde' run nowhere.sonde --headless --seconds 1
 rejects 'linear' press "$MODEL" --site 27 --probe finger --depth-mm 2
 rejects 'chronic' press "$MODEL" --site 27 --probe linear --depth-mm 2 --case plague
 rejects 'site' press "$MODEL" --site 99999 --probe linear --depth-mm 2
+rejects 'names no stations: give --site K' press "$MODEL" --depth-mm 2
+rejects 'give one of --pose, --site and --station' image "$MODEL" --site 27 --station groin -o a.png
 rejects 'linear' measure "$MODEL" --sites "$DATA/sites.csv" --probe finger --step-mm 2 --limit-n 10 \
   -o out.csv
 rejects 'interaction|simplified' predict "$MODEL" --measurements "$DATA/indentation.csv" \

@@ -176,12 +176,30 @@ static void the_hello_can_be_read_by_a_json_parser(void **state) {
   cJSON_Delete(root);
 }
 
-static double written(double gain_db) {
+static cJSON *written_controls(double gain_db, page_hidden hidden) {
   sonde_session_controls controls = {.echo = {.gain_db = gain_db}};
   sonde_json_out out = begin_text();
-  page_write_controls(&out, &controls, "point", false, 0,
+  snprintf(controls.pathology.name, sizeof controls.pathology.name, "healthy");
+  page_write_controls(&out, &controls, "point", hidden, 0,
                       (page_role){PAGE_WATCHER, PAGE_LEARNER, PAGE_MAY_NOTHING, false});
-  cJSON *root = end_text(&out);
+  return end_text(&out);
+}
+
+// A learner is not told the case; the posture of a model that has its own is no control.
+static void controls_are_hidden(void **state) {
+  (void)state;
+  cJSON *all = written_controls(0, (page_hidden){false, false}),
+        *none = written_controls(0, (page_hidden){true, true});
+  assert_string_equal(cJSON_GetObjectItem(all, "case")->valuestring, "healthy");
+  assert_string_equal(cJSON_GetObjectItem(all, "posture")->valuestring, "supine");
+  assert_string_equal(cJSON_GetObjectItem(none, "case")->valuestring, "");
+  assert_null(cJSON_GetObjectItem(none, "posture"));
+  cJSON_Delete(all);
+  cJSON_Delete(none);
+}
+
+static double written(double gain_db) {
+  cJSON *root = written_controls(gain_db, (page_hidden){false, false});
   assert_non_null(root);
   const cJSON *gain = cJSON_GetObjectItem(root, "gain_db");
   double value = cJSON_IsNull(gain) ? (double)NAN : gain->valuedouble;
@@ -376,6 +394,7 @@ int main(void) {
       cmocka_unit_test(displacements_are_rounded_and_saturate),
       cmocka_unit_test(the_hello_can_be_read_by_a_json_parser),
       cmocka_unit_test(numbers_survive_writing),
+      cmocka_unit_test(controls_are_hidden),
       cmocka_unit_test(a_goal_is_read_in_si),
       cmocka_unit_test(controls_leave_out_what_is_absent),
       cmocka_unit_test(bad_commands_are_refused),

@@ -47,6 +47,51 @@ static void a_case_is_read(void **state) {
   assert_int_equal(c.truth[2], SONDE_DECISION_CLOT);
 }
 
+// A leg in a position: it is read, written and read again, and takes no posture beside it.
+static void a_leg_has_its_position(void **state) {
+  (void)state;
+  static const char LEG[] = "sonde_case: 3\n"
+                            "id: bent\n"
+                            "title: Bent\n"
+                            "level: easy\n"
+                            "history: None.\n"
+                            "leg: {seed: 3, bmi: 24, side: left, position: prone_bent}\n"
+                            "%s"
+                            "vein: {stage: healthy}\n"
+                            "truth:\n"
+                            "  thrombosis: false\n"
+                            "  diagnosis: None\n"
+                            "  segments: {common_femoral: compressible, femoral_proximal: "
+                            "compressible, femoral_mid: compressible, femoral_distal: "
+                            "compressible, popliteal: compressible}\n";
+  char text[1024];
+  sonde_case c, again;
+  sonde_case_setup setup;
+  sonde_error error = {0};
+  snprintf(text, sizeof text, LEG, "");
+  if (sonde_case_parse(text, "bent.yaml", &c, &error)) fail_msg("%s", error.message);
+  assert_int_equal(c.position, SONDE_LIMB_PRONE_BENT);
+  assert_int_equal(sonde_case_save(&c, "test_case_bent.yaml", NULL), SONDE_OK);
+  assert_int_equal(sonde_case_load("test_case_bent.yaml", &again, NULL), SONDE_OK);
+  assert_int_equal(again.position, SONDE_LIMB_PRONE_BENT);
+  remove("test_case_bent.yaml");
+  // Its thigh is that position's, and so are the places of the examination.
+  if (sonde_case_build(&c, NULL, NULL, &setup, &error)) fail_msg("%s", error.message);
+  const sonde_limb_pose *pose = sonde_limb_pose_of(setup.model);
+  assert_non_null(pose);
+  assert_int_equal(sonde_limb_pose_setting(pose).position, SONDE_LIMB_PRONE_BENT);
+  sonde_limb_station station[SONDE_LIMB_STATIONS];
+  sonde_limb_pose_stations(pose, station);
+  for (uint32_t k = 0; k < setup.map.station_count; ++k) {
+    sonde_vec3 skin = sonde_limb_to_model(sonde_limb_of(setup.model), station[k].skin_m);
+    assert_near(v_distance(setup.map.station[k].probe.position, skin), 0, 1e-6);
+  }
+  sonde_case_setup_clear(&setup);
+  snprintf(text, sizeof text, LEG, "circulation: {posture: sitting}\n");
+  assert_int_equal(sonde_case_parse(text, "bent.yaml", &c, &error), SONDE_MISMATCH);
+  assert_non_null(strstr(error.message, "no posture"));
+}
+
 static void mistakes_are_named_with_their_line(void **state) {
   (void)state;
   static const struct {
@@ -403,6 +448,7 @@ static void the_cases_that_ship_are_good(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_case_is_read),
+      cmocka_unit_test(a_leg_has_its_position),
       cmocka_unit_test(mistakes_are_named_with_their_line),
       cmocka_unit_test(the_truth_must_fit),
       cmocka_unit_test(findings_are_placed),

@@ -33,7 +33,9 @@ void sonde_subject_control(sonde_subject *subject, const sonde_session_controls 
   sonde_session_controls before = subject->now.controls;
   double time_s = sonde_state_time(subject->state);
   subject->now.controls = *controls;
-  subject->now.circulation.posture = controls->posture;
+  // A model that says how it is held brings what its posture adds.
+  const bool held = v_norm2(subject->model->gravity.up) > 0;
+  subject->now.circulation.posture = held ? SONDE_POSTURE_SUPINE : controls->posture;
   if (controls->valsalva != before.valsalva)
     sonde_circulation_strain(&subject->now.circulation, time_s, controls->valsalva);
   if (!subject->now.placed ||

@@ -61,11 +61,17 @@ typedef struct page_role {
   bool controls;
 } page_role;
 
+// What is left out of the controls.
+typedef struct page_hidden {
+  bool pathology; // a learner may not be told its name
+  bool posture;   // the model says how it is held
+} page_hidden;
+
 // Each writer puts one message onto a text in memory.
 void page_write_hello(sonde_json_out *out, const page_hello *hello);
-// @param hide_case a learner may not be told its name @param gel_m3 on the skin
+// @param gel_m3 on the skin
 void page_write_controls(sonde_json_out *out, const sonde_session_controls *controls,
-                         const char *probe_name, bool hide_case, double gel_m3, page_role role);
+                         const char *probe_name, page_hidden hidden, double gel_m3, page_role role);
 bool page_posture_parse(const char *name, sonde_posture *posture);
 
 typedef enum page_command_type {

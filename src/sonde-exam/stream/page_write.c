@@ -93,7 +93,8 @@ bool page_posture_parse(const char *name, sonde_posture *posture) {
 }
 
 void page_write_controls(sonde_json_out *out, const sonde_session_controls *controls,
-                         const char *probe_name, bool hide_case, double gel_m3, page_role role) {
+                         const char *probe_name, page_hidden hidden, double gel_m3,
+                         page_role role) {
   static const char *const WHO[] = {"nobody", "learner", "watcher", "teacher"};
   static const char *const MAY[] = {"", "take", "give", "return"};
   const sonde_echo_settings *echo = &controls->echo;
@@ -105,7 +106,7 @@ void page_write_controls(sonde_json_out *out, const sonde_session_controls *cont
   sonde_json_put_text(out, "holder", WHO[role.holder]);
   sonde_json_put_text(out, "may", MAY[role.may]);
   sonde_json_put_text(out, "probe", probe_name);
-  sonde_json_put_text(out, "case", hide_case ? "" : controls->pathology.name);
+  sonde_json_put_text(out, "case", hidden.pathology ? "" : controls->pathology.name);
   sonde_json_put_bool(out, "stop", controls->stop);
   // The scanner's settings in the page's units.
   put_real(out, "gain_db", echo->gain_db);
@@ -115,7 +116,7 @@ void page_write_controls(sonde_json_out *out, const sonde_session_controls *cont
   put_real(out, "focus_mm", echo->focus_m * 1e3);
   put_real(out, "tgc_db_per_cm", echo->tgc_db_per_m * 1e-2);
   // The patient and the tissue.
-  sonde_json_put_text(out, "posture", POSTURES[controls->posture]);
+  if (!hidden.posture) sonde_json_put_text(out, "posture", POSTURES[controls->posture]);
   sonde_json_put_bool(out, "valsalva", controls->valsalva);
   sonde_json_put_bool(out, "gel", controls->gel);
   put_real(out, "gel_ml", gel_m3 * 1e6);

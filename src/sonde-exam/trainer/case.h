@@ -9,6 +9,7 @@ extern const char *const sonde_case_postures[]; // likewise
 extern const char *const sonde_case_lesions[];
 extern const char *const sonde_case_sexes[];
 extern const char *const sonde_case_sides[];
+extern const char *const sonde_case_positions[]; // of sonde_limb_position, then straight
 
 // Everything that needs no model; a sentence without place.
 sonde_status sonde_case_check(const sonde_case *of, sonde_error *error);

@@ -28,6 +28,11 @@ static sonde_status get_model(const sonde_case *from, const char *bundled, const
     sonde_limb_model_def def = sonde_limb_model_def_default();
     def.name = from->id;
     def.provenance = "Synthetic limb of a training case";
+    sonde_limb_setting setting;
+    if (from->position < SONDE_LIMB_POSITIONS) {
+      setting = sonde_limb_setting_usual(from->position);
+      def.setting = &setting;
+    }
     sonde_status status = sonde_limb_draw(&from->leg, from->seed, &body, error);
     return status ? status : sonde_limb_model(&body, &def, model, error);
   }

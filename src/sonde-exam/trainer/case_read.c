@@ -11,6 +11,10 @@ const char *const sonde_case_postures[] = {"supine", "sitting", "standing", NULL
 const char *const sonde_case_lesions[] = {"node", "cyst", "haematoma", NULL};
 const char *const sonde_case_sexes[] = {"drawn", "female", "male", NULL};
 const char *const sonde_case_sides[] = {"right", "left", NULL};
+const char *const sonde_case_positions[] = {"supine_turned", "prone_bent", "sitting",  "supine",
+                                            "prone",         "standing",   "straight", NULL};
+_Static_assert(SONDE_COUNT_OF(sonde_case_positions) == SONDE_LIMB_POSITIONS + 2,
+               "a name for each position");
 static const char *const DECISIONS[] = {"", "compressible", "clot", "not_seen"};
 
 static const double UNKNOWN = (double)NAN;
@@ -37,6 +41,7 @@ bool sonde_decision_parse(const char *name, sonde_decision *decision) {
 sonde_case sonde_case_default(void) {
   sonde_case c = {.known = sonde_thigh_unknown(),
                   .leg = sonde_limb_unknown(),
+                  .position = SONDE_LIMB_POSITIONS,
                   .circulation = sonde_circulation_default(),
                   .extent.whole = true};
   sonde_status status = sonde_pathology_preset("healthy", &c.pathology, NULL);
@@ -47,15 +52,15 @@ sonde_case sonde_case_default(void) {
 // ---- the patient
 
 // What a map gives of a body that is drawn: its seed, its sex and parameters, in their units at the
-// boundary. `more`: another key of the map, or NULL.
-static sonde_sex read_body(sonde_reader *reader, sonde_place at, const char *what, const char *more,
+// boundary. `leg`: side and position are keys too.
+static sonde_sex read_body(sonde_reader *reader, sonde_place at, const char *what, bool leg,
                            const sonde_parameter *parameter, uint32_t count, void *to,
                            uint64_t *seed) {
   enum { KEYS = 48 };
   const char *keys[KEYS] = {"seed", "sex"};
-  SONDE_ASSERT(count + 4 <= KEYS);
+  SONDE_ASSERT(count + 5 <= KEYS);
   for (uint32_t i = 0; i < count; ++i) keys[2 + i] = parameter[i].name;
-  keys[2 + count] = more;
+  if (leg) keys[2 + count] = "side", keys[3 + count] = "position";
   sonde_read_keys(reader, at, what, keys);
   for (uint32_t i = 0; i < count; ++i) {
     const sonde_parameter *p = &parameter[i];
@@ -79,8 +84,10 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   if (leg) {
     const sonde_parameter *parameter = sonde_limb_parameters(&count);
     c->thigh = SONDE_CASE_LEG;
-    c->leg.sex = read_body(reader, leg, "leg", "side", parameter, count, &c->leg, &c->seed);
+    c->leg.sex = read_body(reader, leg, "leg", true, parameter, count, &c->leg, &c->seed);
     c->leg.side = (sonde_limb_side)sonde_read_choice(reader, leg, "side", sonde_case_sides, 0);
+    c->position = (sonde_limb_position)sonde_read_choice(
+        reader, leg, "position", sonde_case_positions, SONDE_LIMB_POSITIONS);
   }
   if (!at || leg) return;
   if (sonde_read_is_text(reader, at)) {
@@ -98,7 +105,7 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
   }
   const sonde_parameter *parameter = sonde_thigh_parameters(&count);
   c->thigh = SONDE_CASE_GENERATED;
-  c->known.sex = read_body(reader, at, "thigh", NULL, parameter, count, &c->known, &c->seed);
+  c->known.sex = read_body(reader, at, "thigh", false, parameter, count, &c->known, &c->seed);
 }
 
 // ---- pathology
@@ -268,6 +275,9 @@ sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
   if (clot != of->thrombosis)
     return sonde_fail(error, SONDE_MISMATCH, "thrombosis is %s, but %s segment is clot",
                       of->thrombosis ? "true" : "false", clot ? "a" : "no deep");
+  if (of->position < SONDE_LIMB_POSITIONS && of->circulation.posture != SONDE_POSTURE_SUPINE)
+    return sonde_fail(error, SONDE_MISMATCH,
+                      "the leg's position says how the patient is held: no posture beside it");
   if (of->webs > 0 && !(of->pathology.thrombus_fraction > 0))
     return sonde_fail(error, SONDE_MISMATCH, "webs in a vein without a clot");
   return SONDE_OK;

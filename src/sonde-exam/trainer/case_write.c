@@ -79,6 +79,8 @@ static void put_case(sonde_file *file, const sonde_case *c) {
     sonde_file_printf(file, "leg:\n  seed: %llu\n  sex: %s\n  side: %s\n",
                       (unsigned long long)c->seed, sonde_case_sexes[known.sex],
                       sonde_case_sides[known.side]);
+    if (c->position < SONDE_LIMB_POSITIONS)
+      sonde_file_printf(file, "  position: %s\n", sonde_case_positions[c->position]);
     put_parameters(file, p, count, &known);
   }
 

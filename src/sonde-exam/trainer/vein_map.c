@@ -152,7 +152,11 @@ static void find_stations(const sonde_model *model, const sonde_limb *limb, sond
                                          {"great_saphenous", "great_saphenous"},
                                          {"small_saphenous", "small_saphenous"}};
   sonde_limb_station station[SONDE_LIMB_STATIONS];
-  sonde_limb_stations(limb, station);
+  const sonde_limb_pose *pose = sonde_limb_pose_of(model);
+  if (pose)
+    sonde_limb_pose_stations(pose, station);
+  else
+    sonde_limb_stations(limb, station);
   map->station_count = SONDE_LIMB_STATIONS;
   SONDE_ASSERT(model->site_count >= SONDE_LIMB_STATIONS &&
                map->landmark_count >= map->station_count);

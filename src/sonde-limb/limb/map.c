@@ -3,25 +3,60 @@
 
 #include "limb/label.h"
 #include "limb/muscles.h"
+#include "limb/pose.h"
 #include "limb/vessels.h"
 #include "sonde/limb_model.h"
 
-// A point of the model's frame in that of a right limb.
-static sonde_vec3 in_limb(const sonde_limb *limb, sonde_vec3 p) {
+#include <stdatomic.h>
+
+// A point of the model's frame in that of a right limb: straight when the model is, else posed.
+static sonde_vec3 as_held(const sonde_limb *limb, sonde_vec3 p) {
   return limb_side_point(limb, sonde_limb_to_model(limb, p));
 }
 
+// A point of the model's frame in that of a straight right limb. The maps of one picture ask for
+// the same point one after the other: each thread remembers its last one.
+static sonde_vec3 in_limb(const limb_held *held, sonde_vec3 p) {
+  static _Thread_local struct {
+    uint64_t number; // 0: none yet
+    sonde_vec3 posed, rest;
+  } last;
+  const sonde_vec3 posed = as_held(held->limb, p);
+  if (!held->pose) return posed;
+  if (last.number != held->number || v_norm2(v_sub(last.posed, posed)) > 0) {
+    (void)limb_pose_inverse(held->pose, posed, &last.rest);
+    last.number = held->number, last.posed = posed;
+  }
+  return last.rest;
+}
+
+// A direction at a point of the straight right limb, in the model's frame; not of unit length.
+static sonde_vec3 in_model(const limb_held *held, sonde_vec3 at, sonde_vec3 direction) {
+  if (held->pose) {
+    sonde_mat3 gradient = limb_pose_gradient(held->pose, at);
+    direction = m_mul_v(gradient, direction);
+  }
+  return limb_side_point(held->limb, vec3(direction.x, direction.y, -direction.z));
+}
+
 static void depths(const void *self, sonde_vec3 rest, sonde_tissue_depths *d) {
-  const sonde_limb *limb = self;
-  sonde_vec3 p = in_limb(limb, rest);
-  limb_layers layers = limb_layers_at(limb, p);
+  const limb_held *held = self;
+  const sonde_vec3 p = in_limb(held, rest);
+  limb_layers layers = limb_layers_at(held->limb, p);
   const double xyz[3] = {p.x, p.y, p.z};
-  *d = (sonde_tissue_depths){layers.skin, layers.superficial, layers.fascia,
-                             limb_bone_distance(limb, xyz, NULL)};
+  double bone = limb_bone_distance(held->limb, xyz, NULL);
+  if (held->pose) { // bones keep their form
+    const sonde_vec3 q = as_held(held->limb, rest);
+    bone = INFINITY;
+    for (uint32_t k = 0; k < SONDE_LIMB_BONES; ++k)
+      bone = fmin(bone,
+                  limb_one_bone(held->limb->bones, k, pose_apply_inverse(held->pose->bone[k], q)));
+  }
+  *d = (sonde_tissue_depths){layers.skin, layers.superficial, layers.fascia, bone};
 }
 
 static sonde_tissue tissue(const void *self, sonde_vec3 rest) {
-  const sonde_limb *limb = self;
+  const limb_held *held = self;
   static const sonde_tissue OF[SONDE_LIMB_TISSUES] = {
       [SONDE_LIMB_SKIN] = SONDE_TISSUE_SKIN,
       [SONDE_LIMB_FAT] = SONDE_TISSUE_FAT,
@@ -36,7 +71,7 @@ static sonde_tissue tissue(const void *self, sonde_vec3 rest) {
       [SONDE_LIMB_WALL] = SONDE_TISSUE_FAT,
       [SONDE_LIMB_LUMEN] = SONDE_TISSUE_FAT,
       [SONDE_LIMB_BONE] = SONDE_TISSUE_BONE};
-  return OF[sonde_limb_at(limb, sonde_limb_to_model(limb, rest)).tissue];
+  return OF[sonde_limb_at(held->limb, limb_side_point(held->limb, in_limb(held, rest))).tissue];
 }
 
 // Where a point lies in the diagram: x and y from the section's centre, m.
@@ -45,8 +80,7 @@ typedef struct place {
   double x, y;
 } place;
 
-static place place_in(const sonde_limb *limb, sonde_vec3 rest) {
-  sonde_vec3 p = in_limb(limb, rest);
+static place place_in(const sonde_limb *limb, sonde_vec3 p) {
   double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2);
   sonde_vec3 c = limb_centre(limb, level);
   return (place){limb_row_at(limb->muscles, level), p.x - c.x, p.y - c.y};
@@ -64,10 +98,10 @@ static double power_at(const struct limb_muscles *m, const place *p, uint32_t se
 
 static uint32_t seeds(const void *self, sonde_vec3 rest, double within_m, uint32_t room,
                       uint32_t *seed) {
-  const sonde_limb *limb = self;
-  const struct limb_muscles *m = limb->muscles;
+  const limb_held *held = self;
+  const struct limb_muscles *m = held->limb->muscles;
   SONDE_ASSERT(m && room > 0 && seed);
-  const place r = place_in(limb, rest);
+  const place r = place_in(held->limb, in_limb(held, rest));
   double power[LIMB_SEEDS], x[LIMB_SEEDS], y[LIMB_SEEDS];
   const uint32_t active = m->active_count[r.at.row];
   uint32_t best = 0, count = 0;
@@ -90,18 +124,20 @@ static uint32_t seeds(const void *self, sonde_vec3 rest, double within_m, uint32
 }
 
 static sonde_map_seed seed_facts(const void *self, uint32_t seed, sonde_vec3 rest) {
-  const sonde_limb *limb = self;
-  const struct limb_muscles *m = limb->muscles;
+  const limb_held *held = self;
+  const struct limb_muscles *m = held->limb->muscles;
   SONDE_ASSERT(seed < m->seed_count);
-  const place r = place_in(limb, rest);
+  const sonde_vec3 p = in_limb(held, rest);
+  const place r = place_in(held->limb, p);
   limb_cell cell = {.cell = m->cell_of[seed], .seed = seed, .row = r.at.row};
   sonde_map_seed facts = {.cell = cell.cell,
                           .section = (uint32_t)limb_cell_compartment(cell.cell),
                           .muscle = cell.cell < SONDE_LIMB_MUSCLES,
                           .fibre = vec3(0, 0, 1)};
   if (!facts.muscle) return facts;
-  sonde_vec3 fibre = limb_fibre(limb, &cell, in_limb(limb, rest));
-  facts.fibre = limb_side_point(limb, vec3(fibre.x, fibre.y, -fibre.z));
+  const sonde_vec3 fibre = limb_fibre(held->limb, &cell, p);
+  facts.fibre = in_model(held, p, fibre);
+  if (held->pose) facts.fibre = v_unit(facts.fibre, vec3(0, 0, 1));
   // Limbs run down where the model's z goes up: outward-going fibres go outward along z.
   static const double TOWARDS[] = {
       [LIMB_STRAP] = 0, [LIMB_OUTWARD] = 1, [LIMB_INWARD] = -1, [LIMB_CENTRAL] = 0.5};
@@ -113,20 +149,17 @@ static sonde_map_seed seed_facts(const void *self, uint32_t seed, sonde_vec3 res
 
 static void powers(const void *self, sonde_vec3 rest, uint32_t count, const uint32_t *seed,
                    double *power, sonde_vec3 *at) {
-  const sonde_limb *limb = self;
-  const place r = place_in(limb, rest);
+  const limb_held *held = self;
+  const sonde_vec3 p = in_limb(held, rest);
+  const place r = place_in(held->limb, p);
   for (uint32_t k = 0; k < count; ++k) {
     double x, y;
-    power[k] = power_at(limb->muscles, &r, seed[k], &x, &y);
-    if (at) at[k] = v_add(rest, limb_side_point(limb, vec3(x - r.x, y - r.y, 0)));
+    power[k] = power_at(held->limb->muscles, &r, seed[k], &x, &y);
+    if (at) at[k] = v_add(rest, in_model(held, p, vec3(x - r.x, y - r.y, 0)));
   }
 }
 
 static const double FAR_AWAY = 50; // in semi-axes
-
-static sonde_vec3 in_model(const sonde_limb *limb, sonde_vec3 direction) {
-  return limb_side_point(limb, vec3(direction.x, direction.y, -direction.z));
-}
 
 // A nerve, node or tendon, in this order, in the right limb's frame where it comes nearest to p.
 static limb_body nearest(const sonde_limb *limb, uint32_t which, sonde_vec3 p) {
@@ -148,8 +181,9 @@ static limb_body nearest(const sonde_limb *limb, uint32_t which, sonde_vec3 p) {
 
 static uint32_t bodies(const void *self, sonde_vec3 rest, double within_m, uint32_t room,
                        uint32_t *found) {
-  const sonde_limb *limb = self;
-  const sonde_vec3 p = in_limb(limb, rest);
+  const limb_held *held = self;
+  const sonde_limb *limb = held->limb;
+  const sonde_vec3 p = in_limb(held, rest);
   const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
   uint32_t count = 0;
   SONDE_ASSERT(room > 0 && found != NULL);
@@ -166,19 +200,24 @@ static uint32_t bodies(const void *self, sonde_vec3 rest, double within_m, uint3
 }
 
 static sonde_map_body body(const void *self, uint32_t which, sonde_vec3 rest) {
-  const sonde_limb *limb = self;
-  const limb_body b = nearest(limb, which, in_limb(limb, rest));
+  const limb_held *held = self;
+  const sonde_limb *limb = held->limb;
+  const sonde_vec3 p = in_limb(held, rest);
+  const limb_body b = nearest(limb, which, p);
+  sonde_vec3 axis = in_model(held, p, b.axis);
+  if (held->pose) axis = v_unit(axis, vec3(0, 0, 1));
   const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
   return (sonde_map_body){.tissue = b.node           ? SONDE_TISSUE_NODE
                                     : which < nerves ? SONDE_TISSUE_NERVE
                                                      : SONDE_TISSUE_TENDON,
-                          .axis = in_model(limb, b.axis),
+                          .axis = axis,
                           .half_m = {b.wide, b.thick, b.length}};
 }
 
 static sonde_vec3 body_place(const void *self, uint32_t which, sonde_vec3 rest) {
-  const sonde_limb *limb = self;
-  const sonde_vec3 p = in_limb(limb, rest), outside = vec3(FAR_AWAY, FAR_AWAY, 0);
+  const limb_held *held = self;
+  const sonde_limb *limb = held->limb;
+  const sonde_vec3 p = in_limb(held, rest), outside = vec3(FAR_AWAY, FAR_AWAY, 0);
   const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
   if (which >= nerves) {
     const double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2);
@@ -195,18 +234,36 @@ static sonde_vec3 body_place(const void *self, uint32_t which, sonde_vec3 rest) 
               b.length > 0 ? along / b.length : p.z);
 }
 
+void limb_held_clear(limb_held *held) {
+  sonde_limb_pose_destroy(held->pose);
+  sonde_limb_destroy(held->limb);
+  *held = (limb_held){0};
+}
+
 static void destroy(sonde_tissue_map *map) {
-  sonde_limb_destroy(map->self);
+  limb_held_clear(map->self);
+  sonde_free(map->self);
   sonde_free(map);
 }
 
-bool limb_map_is(const sonde_tissue_map *map) { return map && map->destroy == destroy; }
+const limb_held *limb_map_held(const sonde_tissue_map *map) {
+  return map && map->destroy == destroy ? map->self : NULL;
+}
 
-sonde_status limb_map_create(sonde_limb *limb, sonde_tissue_map **map, sonde_error *error) {
-  SONDE_ASSERT(limb && map);
+sonde_status limb_map_create(const limb_held *held, sonde_tissue_map **map, sonde_error *error) {
+  SONDE_ASSERT(held->limb && map);
+  limb_held *self = SONDE_NEW(limb_held, 1);
   *map = SONDE_NEW(sonde_tissue_map, 1);
-  if (!*map) return sonde_fail_memory(error);
-  **map = (sonde_tissue_map){.self = limb,
+  if (!*map || !self) {
+    sonde_free(*map);
+    sonde_free(self);
+    *map = NULL;
+    return sonde_fail_memory(error);
+  }
+  static atomic_uint_least64_t made;
+  *self = *held;
+  self->number = atomic_fetch_add(&made, 1) + 1;
+  **map = (sonde_tissue_map){.self = self,
                              .depths = depths,
                              .tissue = tissue,
                              .seeds = seeds,

@@ -3,10 +3,20 @@
 #define SONDE_SRC_LIMB_MAP_H
 
 #include "limb/frame.h"
+#include "sonde/limb_pose.h"
 
-// @param[out] map owns the limb from then on
-sonde_status limb_map_create(sonde_limb *limb, sonde_tissue_map **map, sonde_error *error);
-// Whether a map (or NULL) is that of a limb.
-bool limb_map_is(const sonde_tissue_map *map);
+// The limb of a model and its position; a straight limb has none.
+typedef struct limb_held {
+  sonde_limb *limb;
+  sonde_limb_pose *pose; // of the limb, or NULL
+  uint64_t number;       // of all maps of a program, from 1
+} limb_held;
+
+// Empties it.
+void limb_held_clear(limb_held *held);
+// @param[out] map owns limb and pose from then on
+sonde_status limb_map_create(const limb_held *held, sonde_tissue_map **map, sonde_error *error);
+// What a map (or NULL) answers for; NULL when it is not that of a limb.
+const limb_held *limb_map_held(const sonde_tissue_map *map);
 
 #endif

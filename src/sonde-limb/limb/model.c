@@ -3,6 +3,7 @@
 
 #include "limb/bones.h"
 #include "limb/map.h"
+#include "limb/pose.h"
 #include "tissue/layer_springs.h"
 
 #include <string.h>
@@ -14,7 +15,8 @@ static const double TENDON_SHARE = 0.2;
 enum { DEPTHS = 12 }; // places between fascia and bone where the tissue is asked for
 
 sonde_limb_model_def sonde_limb_model_def_default(void) {
-  return (sonde_limb_model_def){"limb", "Synthetic limb, not measured", 0.006, 0.003, 1, 0.02};
+  return (sonde_limb_model_def){"limb", "Synthetic limb, not measured", 0.006, 0.003, 1, 0.02,
+                                NULL};
 }
 
 sonde_vec3 sonde_limb_to_model(const sonde_limb *limb, sonde_vec3 p) {
@@ -45,8 +47,14 @@ static sonde_status append(const sonde_limb *limb, const sonde_mesh *from, sonde
   return SONDE_OK;
 }
 
+// A point of the straight limb where the model holds it.
+static sonde_vec3 held_point(const limb_held *held, sonde_vec3 p) {
+  return sonde_limb_to_model(held->limb, held->pose ? sonde_limb_pose_point(held->pose, p) : p);
+}
+
 // Middles of the bones that carry the body: hip joint, neck, shaft, knee, tibia.
-static sonde_status lay_axis(const sonde_limb *limb, sonde_model *model, sonde_error *error) {
+static sonde_status lay_axis(const limb_held *held, sonde_model *model, sonde_error *error) {
+  const sonde_limb *limb = held->limb;
   enum { POINTS = 111, PASSES = 3 };
   model->bone_axis_m = SONDE_NEW(sonde_vec3, POINTS);
   if (!model->bone_axis_m) return sonde_fail_memory(error);
@@ -69,19 +77,26 @@ static sonde_status lay_axis(const sonde_limb *limb, sonde_model *model, sonde_e
       before = now;
     }
   }
-  for (uint32_t k = 0; k < POINTS; ++k) p[k] = v_whole_nm(sonde_limb_to_model(limb, p[k]));
+  for (uint32_t k = 0; k < POINTS; ++k) p[k] = v_whole_nm(held_point(held, p[k]));
   return SONDE_OK;
 }
 
 // Finds layers and springs of every node from the tissue that lies on its inward normal as far as
 // the nearest bone is away.
-static void lay_springs(const sonde_limb *limb, const sonde_limb_model_def *def,
+static void lay_springs(const limb_held *held, const sonde_limb_model_def *def,
                         sonde_model *model) {
+  const sonde_limb *limb = held->limb;
+  const double below_m = 0.002;
   const sonde_tissue_map *map = model->map;
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
     sonde_vec3 node = model->surface.vertices[i], in = v_neg(model->normal[i]);
     sonde_tissue_depths depth;
     map->depths(map->self, node, &depth);
+    if (held->pose) { // the map tells depths at rest: by how much they change along the normal here
+      sonde_tissue_depths below;
+      map->depths(map->self, v_madd(node, below_m, in), &below);
+      depth.fascia_m /= clamp((depth.fascia_m - below.fascia_m) / below_m, 0.5, 2);
+    }
     double bone = model->bone_depth_m[i], skin = fmin(whole_nm(limb->body.skin_m), 0.4 * bone);
     double muscle = clamp(whole_nm(depth.fascia_m), skin, 0.9 * bone), tendon = 0;
     model->fat_depth_m[i] = skin, model->muscle_depth_m[i] = muscle;
@@ -115,28 +130,41 @@ static chain find_chain(const sonde_limb *limb, const char *const *names) {
   return c;
 }
 
-static sonde_limb_vessel_point chain_place(const sonde_limb *limb, const chain *c, double arc) {
+// A place of the vessels as the model holds them, with the radius of 10 mmHg.
+static sonde_limb_vessel_point held_place(const limb_held *held, uint32_t vessel, double arc) {
+  sonde_limb_vessel_point place = sonde_limb_vessel_place(held->limb, vessel, arc);
+  if (!held->pose) return place;
+  place.radius_m *= limb_pose_knee(held->pose, vessel, limb_side_point(held->limb, place.centre_m));
+  place.centre_m = sonde_limb_pose_point(held->pose, place.centre_m);
+  return place;
+}
+
+// Place on a line by its arc, which is that of the straight limb.
+static sonde_limb_vessel_point chain_place(const limb_held *held, const chain *c, double arc) {
+  const sonde_limb *limb = held->limb;
   uint32_t k = 0;
   for (; k + 1 < c->count; ++k) {
     double length = sonde_limb_vessel_get(limb, c->branch[k]).length_m;
     if (arc <= length) break;
     arc -= length;
   }
-  return sonde_limb_vessel_place(limb, c->branch[k], arc);
+  return held_place(held, c->branch[k], arc);
 }
 
 // Lays a line through places at equal arcs of the branches. `down`: places that do not lie lower
 // than the one before are left out, because sections of a main vessel ascend along the leg.
-static void lay_line(const sonde_limb *limb, const chain *c, bool down, sonde_vessel *line) {
+static void lay_line(const limb_held *held, const chain *c, bool down, sonde_vessel *line) {
   const double step_m = 0.004, least_down_m = 0.002;
   uint32_t most = (uint32_t)clamp(ceil(c->length_m / step_m) + 1, 2, SONDE_VESSEL_POINTS);
   line->count = 0;
   for (uint32_t k = 0; k < most; ++k) {
-    sonde_limb_vessel_point at = chain_place(limb, c, c->length_m * k / (most - 1));
-    sonde_vec3 centre = v_whole_nm(sonde_limb_to_model(limb, at.centre_m));
+    sonde_limb_vessel_point at = chain_place(held, c, c->length_m * k / (most - 1));
+    sonde_vec3 centre = v_whole_nm(sonde_limb_to_model(held->limb, at.centre_m));
     if (down && line->count && centre.z < line->point[line->count - 1].centre_m.z + least_down_m)
       continue;
-    double depth = fmax(-sonde_limb_distance(limb, at.centre_m).skin, at.radius_m);
+    double skin = held->pose ? sonde_limb_pose_distance(held->pose, at.centre_m).skin
+                             : sonde_limb_distance(held->limb, at.centre_m).skin;
+    double depth = fmax(isfinite(skin) ? -skin : 0, at.radius_m);
     line->point[line->count++] =
         (sonde_vessel_point){centre, whole_nm(at.radius_m), whole_nm(depth)};
   }
@@ -148,8 +176,9 @@ static const char *const ARTERIES[] = {"external iliac artery", "common femoral 
                                        "superficial femoral artery", "popliteal artery", NULL};
 
 // Vessels beside the main ones, in the order of the graph while there is room.
-static void lay_branches(const sonde_limb *limb, const chain *veins, const chain *arteries,
+static void lay_branches(const limb_held *held, const chain *veins, const chain *arteries,
                          sonde_thigh_anatomy *a) {
+  const sonde_limb *limb = held->limb;
   const uint32_t count = sonde_limb_vessel_count(limb);
   for (uint32_t v = 0; v < count && a->branch_count < SONDE_BRANCHES; ++v) {
     bool main = false;
@@ -171,15 +200,17 @@ static void lay_branches(const sonde_limb *limb, const chain *veins, const chain
     if (last && strlen(last) == strlen("saphenous_vein")) last[strlen("saphenous")] = '\0';
     while (strlen(all) >= sizeof branch->name && (last = strrchr(all, '_')) != NULL) *last = '\0';
     snprintf(branch->name, sizeof branch->name, "%.31s", all);
-    lay_line(limb, &c, false, &branch->line);
+    lay_line(held, &c, false, &branch->line);
   }
 }
 
 /* ---- stations ----------------------------------------------------------------------------- */
 
-static sonde_site site_at(const sonde_limb *limb, uint32_t id, sonde_vec3 skin, sonde_vec3 normal) {
+// A site across the limb, which runs along `axis` there. @param skin, normal as held
+static sonde_site site_at(const sonde_limb *limb, uint32_t id, sonde_vec3 skin, sonde_vec3 normal,
+                          sonde_vec3 axis) {
   sonde_vec3 n = vec3(normal.x, normal.y, -normal.z),
-             u = v_unit(v_cross(vec3(0, 0, 1), n), vec3(1, 0, 0));
+             u = v_unit(v_cross(vec3(axis.x, axis.y, -axis.z), n), vec3(1, 0, 0));
   return (sonde_site){.id = id,
                       .position_m = v_whole_nm(sonde_limb_to_model(limb, skin)),
                       .normal = n,
@@ -187,35 +218,50 @@ static sonde_site site_at(const sonde_limb *limb, uint32_t id, sonde_vec3 skin, 
                       .v = v_cross(n, u)};
 }
 
+// Direction of the limb, downwards, where the model holds a point of the straight limb.
+static sonde_vec3 held_axis(const limb_held *held, sonde_vec3 rest) {
+  const sonde_vec3 down = vec3(0, 0, -1);
+  if (!held->pose) return down;
+  sonde_mat3 gradient = limb_pose_gradient(held->pose, limb_side_point(held->limb, rest));
+  return limb_side_point(held->limb, v_unit(m_mul_v(gradient, down), down));
+}
+
 // Sites stand at the stations and along the main vein. Between two stations the side from which the
 // probe looks at the vein turns evenly from that of one to that of the other.
-static void lay_sites(const sonde_limb *limb, const chain *veins,
+static void lay_sites(const limb_held *held, const chain *veins,
                       const sonde_limb_station station[SONDE_LIMB_STATIONS],
                       sonde_site site[SITES]) {
   enum { LAST = 9 }; // station at the popliteal vein's end
+  const sonde_limb *limb = held->limb;
+  const limb_held straight = {.limb = held->limb};
   double level[SONDE_LIMB_STATIONS], angle[SONDE_LIMB_STATIONS], f;
   for (uint32_t k = 0; k < SONDE_LIMB_STATIONS; ++k) {
-    site[k] = site_at(limb, k, station[k].skin_m, station[k].normal);
-    sonde_limb_polar(limb, station[k].skin_m, &level[k], &angle[k], &f);
+    sonde_vec3 rest = station[k].skin_m;
+    if (held->pose) (void)sonde_limb_pose_rest(held->pose, station[k].skin_m, &rest);
+    site[k] = site_at(limb, k, station[k].skin_m, station[k].normal, held_axis(held, rest));
+    sonde_limb_polar(limb, rest, &level[k], &angle[k], &f);
   }
   for (uint32_t k = 0; k < COURSE_SITES; ++k) {
     double arc = veins->length_m * (k + 1.0) / (COURSE_SITES + 1), at, unused;
-    sonde_limb_polar(limb, chain_place(limb, veins, arc).centre_m, &at, &unused, &f);
+    sonde_limb_polar(limb, chain_place(&straight, veins, arc).centre_m, &at, &unused, &f);
     uint32_t i = 0;
     while (i + 1 < LAST && level[i + 1] < at) ++i;
     double t = clamp((at - level[i]) / (level[i + 1] - level[i]), 0, 1);
     double side = angle[i] + t * remainder(angle[i + 1] - angle[i], 2 * SONDE_PI);
-    sonde_vec3 p[3];
-    const double shift[3][2] = {{0, 0}, {0.01, 0}, {0, 0.02}};
+    sonde_vec3 rest = vec3(0, 0, 0), middle = sonde_limb_point(limb, at, side, 0), p[3];
+    const double shift[3][2] = {{0.01, 0}, {0, 0.02}, {0, 0}};
     for (int j = 0; j < 3; ++j) {
       double l = at + shift[j][0], a = side + shift[j][1];
       double out = limb_skin_radius(limb, l, a) / limb_fascia_radius(limb, l, a);
-      p[j] = sonde_limb_point(limb, l, a, out);
+      p[j] = rest = sonde_limb_point(limb, l, a, out);
+      if (held->pose) p[j] = sonde_limb_pose_point(held->pose, rest);
     }
-    sonde_vec3 n = v_unit(v_cross(v_sub(p[1], p[0]), v_sub(p[2], p[0])), vec3(0, 1, 0));
-    sonde_vec3 out = v_sub(p[0], sonde_limb_point(limb, at, side, 0));
+    if (held->pose) middle = sonde_limb_pose_point(held->pose, middle);
+    sonde_vec3 n = v_unit(v_cross(v_sub(p[0], p[2]), v_sub(p[1], p[2])), vec3(0, 1, 0));
+    sonde_vec3 out = v_sub(p[2], middle);
     site[SONDE_LIMB_STATIONS + k] =
-        site_at(limb, SONDE_LIMB_STATIONS + k, p[0], v_dot(n, out) < 0 ? v_neg(n) : n);
+        site_at(limb, SONDE_LIMB_STATIONS + k, p[2], v_dot(n, out) < 0 ? v_neg(n) : n,
+                held_axis(held, rest));
   }
 }
 
@@ -228,8 +274,9 @@ static const char *const LANDMARKS[] = {
 _Static_assert(SONDE_COUNT_OF(LANDMARKS) == SONDE_LIMB_STATIONS, "a name for each station");
 
 // Stations as landmarks, and stretches of the main vein.
-static void name_parts(const sonde_limb *limb,
-                       const sonde_limb_station station[SONDE_LIMB_STATIONS], sonde_model *model) {
+static void name_parts(const limb_held *held, const sonde_limb_station station[SONDE_LIMB_STATIONS],
+                       sonde_model *model) {
+  const sonde_limb *limb = held->limb;
   sonde_thigh_anatomy *a = model->anatomy;
   _Static_assert((int)SONDE_LIMB_STATIONS <= (int)SONDE_LANDMARKS, "a landmark for each station");
   for (uint32_t k = 0; k < SONDE_LIMB_STATIONS; ++k) {
@@ -243,13 +290,10 @@ static void name_parts(const sonde_limb *limb,
   uint32_t common = sonde_limb_vessel_find(limb, "common femoral vein"),
            popliteal = sonde_limb_vessel_find(limb, "popliteal vein");
   const sonde_vessel *vein = &model->vein;
-  double ligament = sonde_limb_to_model(limb, sonde_limb_vessel_place(limb, common, 0).centre_m).z;
-  double meet =
-      sonde_limb_to_model(
-          limb, sonde_limb_vessel_place(limb, common, sonde_limb_vessel_get(limb, common).length_m)
-                    .centre_m)
-          .z;
-  double hiatus = sonde_limb_to_model(limb, sonde_limb_vessel_place(limb, popliteal, 0).centre_m).z;
+  double whole = sonde_limb_vessel_get(limb, common).length_m;
+  double ligament = sonde_limb_to_model(limb, held_place(held, common, 0).centre_m).z;
+  double meet = sonde_limb_to_model(limb, held_place(held, common, whole).centre_m).z;
+  double hiatus = sonde_limb_to_model(limb, held_place(held, popliteal, 0).centre_m).z;
   double third = (hiatus - meet) / 3, end = vein->point[vein->count - 1].centre_m.z;
   const struct {
     const char *name;
@@ -269,10 +313,10 @@ static void name_parts(const sonde_limb *limb,
 
 /* ---- the body as numbers ------------------------------------------------------------------ */
 
-enum { ORIGIN_VERSION = 1, ORIGIN_HEAD = 5 };
+enum { ORIGIN_STRAIGHT = 1, ORIGIN_POSED = 2, ORIGIN_HEAD = 5, ORIGIN_SETTING = 5 };
 
 // Version, sex, side, both halves of the seed, the parameters in the order of SONDE_LIMB_LIST, the
-// muscles' shares.
+// muscles' shares; of a limb in a position also the position and the joints' angles.
 static uint32_t body_numbers(sonde_limb_body *body, double **number) {
   uint32_t count = 0;
 #define X(member, name, unit, low, high, text) number[count++] = &body->member;
@@ -286,14 +330,19 @@ enum { MOST_NUMBERS = 128 };
 
 /* ---- the model ---------------------------------------------------------------------------- */
 
-static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sonde_mesh *skin,
+static sonde_status make(const limb_held *held, const sonde_limb_model_def *def, sonde_mesh *skin,
                          sonde_mesh *bones, sonde_model **out, sonde_error *error) {
+  const sonde_limb *limb = held->limb;
+  const sonde_limb_pose *pose = held->pose;
   sonde_mesh part = {0};
-  sonde_status status = sonde_limb_skin(limb, def->edge_m, &part, error);
+  sonde_status status = pose ? sonde_limb_pose_skin(pose, def->edge_m, &part, error)
+                             : sonde_limb_skin(limb, def->edge_m, &part, error);
   if (!status) status = append(limb, &part, skin, error);
   sonde_mesh_clear(&part);
   for (int bone = 0; bone < SONDE_LIMB_BONES && !status; ++bone) {
-    status = sonde_limb_bone_mesh(limb, (sonde_limb_bone)bone, BONE_EDGE_M, &part, error);
+    sonde_limb_bone which = (sonde_limb_bone)bone;
+    status = pose ? sonde_limb_pose_bone_mesh(pose, which, BONE_EDGE_M, &part, error)
+                  : sonde_limb_bone_mesh(limb, which, BONE_EDGE_M, &part, error);
     if (!status) status = append(limb, &part, bones, error);
     sonde_mesh_clear(&part);
   }
@@ -301,8 +350,11 @@ static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sond
   sonde_limb_station station[SONDE_LIMB_STATIONS];
   sonde_site site[SITES];
   chain veins = find_chain(limb, VEINS), arteries = find_chain(limb, ARTERIES);
-  sonde_limb_stations(limb, station);
-  lay_sites(limb, &veins, station, site);
+  if (pose)
+    sonde_limb_pose_stations(pose, station);
+  else
+    sonde_limb_stations(limb, station);
+  lay_sites(held, &veins, station, site);
   sonde_model_def built = sonde_model_def_default();
   built.name = def->name, built.provenance = def->provenance;
   built.skin = skin, built.femur = bones;
@@ -314,30 +366,43 @@ static sonde_status make(sonde_limb *limb, const sonde_limb_model_def *def, sond
   sonde_model *model = *out;
   model->anatomy = SONDE_NEW(sonde_thigh_anatomy, 1);
   if (!model->anatomy) return sonde_fail_memory(error);
-  status = limb_map_create(limb, &model->map, error);
-  if (!status) status = lay_axis(limb, model, error);
+  status = limb_map_create(held, &model->map, error);
+  if (!status) status = lay_axis(held, model, error);
   if (status) return status;
+  if (pose) {
+    const sonde_vec3 up = sonde_limb_pose_up(pose);
+    model->gravity =
+        (sonde_gravity){limb_pose_posture(pose->setting.position), vec3(up.x, up.y, -up.z),
+                        sonde_limb_to_model(limb, limb_side_point(limb, limb_pose_groin(pose)))};
+  }
   // The body as numbers, for the file.
   sonde_limb_body copy = limb->body;
   double *number[MOST_NUMBERS];
   const uint32_t count = body_numbers(&copy, number);
-  double *to = model->map_origin = SONDE_NEW(double, ORIGIN_HEAD + count);
+  const uint32_t numbers = ORIGIN_HEAD + count + (pose ? ORIGIN_SETTING : 0);
+  double *to = model->map_origin = SONDE_NEW(double, numbers);
   if (!to) return sonde_fail_memory(error);
-  model->map_origin_count = ORIGIN_HEAD + count;
-  to[0] = ORIGIN_VERSION, to[1] = copy.sex, to[2] = copy.side;
+  model->map_origin_count = numbers;
+  to[0] = pose ? ORIGIN_POSED : ORIGIN_STRAIGHT, to[1] = copy.sex, to[2] = copy.side;
   to[3] = (double)(copy.seed >> 32), to[4] = (double)(copy.seed & 0xffffffffu);
   for (uint32_t k = 0; k < count; ++k) to[ORIGIN_HEAD + k] = *number[k];
-  lay_springs(limb, def, model);
+  if (pose) {
+    to += ORIGIN_HEAD + count;
+    to[0] = pose->setting.position, to[1] = pose->setting.hip_flexion_rad;
+    to[2] = pose->setting.hip_rotation_rad, to[3] = pose->setting.hip_abduction_rad;
+    to[4] = pose->setting.knee_flexion_rad;
+  }
+  lay_springs(held, def, model);
   // A site has the springs of the node nearest to it.
   for (uint32_t k = 0; k < SITES; ++k) {
     uint32_t at =
         v_nearest(model->surface.vertices, model->surface.vertex_count, model->sites[k].position_m);
     model->sites[k].k0_n_m3 = model->k0_n_m3[at], model->sites[k].xm_m = model->xm_m[at];
   }
-  lay_line(limb, &veins, true, &model->vein);
-  lay_line(limb, &arteries, true, &model->artery);
-  lay_branches(limb, &veins, &arteries, model->anatomy);
-  name_parts(limb, station, model);
+  lay_line(held, &veins, true, &model->vein);
+  lay_line(held, &arteries, true, &model->artery);
+  lay_branches(held, &veins, &arteries, model->anatomy);
+  name_parts(held, station, model);
   return SONDE_OK;
 }
 
@@ -349,17 +414,18 @@ sonde_status sonde_limb_model(const sonde_limb_body *body, const sonde_limb_mode
     return sonde_fail(error, SONDE_ARGUMENT, "edge_m is %g, expected 0.003 to 0.02", def->edge_m);
   if (!(def->stiffness >= 0.2 && def->stiffness <= 5))
     return sonde_fail(error, SONDE_ARGUMENT, "stiffness is %g, expected 0.2 to 5", def->stiffness);
-  sonde_limb *limb;
+  limb_held held = {0};
   sonde_mesh skin = {0}, bones = {0};
-  sonde_status status = sonde_limb_create(body, &limb, error);
-  if (status) return status;
-  status = make(limb, def, &skin, &bones, model, error);
+  sonde_status status = sonde_limb_create(body, &held.limb, error);
+  if (!status && def->setting)
+    status = sonde_limb_pose_create(held.limb, def->setting, &held.pose, error);
+  if (!status) status = make(&held, def, &skin, &bones, model, error);
   sonde_mesh_clear(&skin);
   sonde_mesh_clear(&bones);
   if (status) {
     bool owned = *model && (*model)->map; // the limb is the map's
     sonde_model_destroy(*model);
-    if (!owned) sonde_limb_destroy(limb);
+    if (!owned) limb_held_clear(&held);
     *model = NULL;
   }
   return status;
@@ -367,7 +433,14 @@ sonde_status sonde_limb_model(const sonde_limb_body *body, const sonde_limb_mode
 
 const sonde_limb *sonde_limb_of(const sonde_model *model) {
   SONDE_ASSERT(model);
-  return limb_map_is(model->map) ? model->map->self : NULL;
+  const limb_held *held = limb_map_held(model->map);
+  return held ? held->limb : NULL;
+}
+
+const sonde_limb_pose *sonde_limb_pose_of(const sonde_model *model) {
+  SONDE_ASSERT(model);
+  const limb_held *held = limb_map_held(model->map);
+  return held ? held->pose : NULL;
 }
 
 sonde_status sonde_limb_model_load(const char *path, sonde_model **out, sonde_error *error) {
@@ -380,17 +453,22 @@ sonde_status sonde_limb_model_load(const char *path, sonde_model **out, sonde_er
   }
   const double tolerance_m = 1e-6;
   sonde_limb_body body;
-  sonde_limb *limb = NULL;
+  sonde_limb_setting setting;
+  limb_held held = {0};
   // The body from its numbers.
   const double *from = model->map_origin;
   double *number[MOST_NUMBERS];
   body = sonde_limb_unknown();
   const uint32_t count = body_numbers(&body, number);
-  bool good = model->map_origin_count == ORIGIN_HEAD + count && from[0] == ORIGIN_VERSION &&
+  const bool posed = model->map_origin_count == ORIGIN_HEAD + count + ORIGIN_SETTING;
+  bool good = (posed || model->map_origin_count == ORIGIN_HEAD + count) &&
+              from[0] == (posed ? ORIGIN_POSED : ORIGIN_STRAIGHT) &&
               (from[1] == SONDE_SEX_FEMALE || from[1] == SONDE_SEX_MALE) &&
               (from[2] == SONDE_LIMB_RIGHT || from[2] == SONDE_LIMB_LEFT) && from[3] >= 0 &&
               from[3] < 4294967296.0 && from[4] >= 0 && from[4] < 4294967296.0;
   for (uint32_t k = 0; good && k < count; ++k) good = isfinite(*number[k] = from[ORIGIN_HEAD + k]);
+  const double *held_as = from + ORIGIN_HEAD + count;
+  if (good && posed) good = held_as[0] >= 0 && held_as[0] < SONDE_LIMB_POSITIONS;
   if (good) {
     body.sex = (sonde_sex)from[1], body.side = (sonde_limb_side)from[2];
     body.seed = (uint64_t)from[3] << 32 | (uint64_t)from[4];
@@ -399,17 +477,22 @@ sonde_status sonde_limb_model_load(const char *path, sonde_model **out, sonde_er
                         "%s: describes a limb that this program does not know", path);
   }
   if (!status) status = sonde_limb_draw(&body, body.seed, &body, error);
-  if (!status) status = sonde_limb_create(&body, &limb, error);
-  if (!status) status = limb_map_create(limb, &model->map, error);
+  if (!status) status = sonde_limb_create(&body, &held.limb, error);
+  if (!status && posed) {
+    setting = (sonde_limb_setting){(sonde_limb_position)held_as[0], held_as[1], held_as[2],
+                                   held_as[3], held_as[4]};
+    status = sonde_limb_pose_create(held.limb, &setting, &held.pose, error);
+  }
+  if (!status) status = limb_map_create(&held, &model->map, error);
   if (status) {
-    sonde_limb_destroy(limb);
+    limb_held_clear(&held);
     sonde_model_destroy(model);
     return status;
   }
   // The same limb has its vein where the file says.
   sonde_vessel vein = {0};
-  chain veins = find_chain(limb, VEINS);
-  lay_line(limb, &veins, true, &vein);
+  chain veins = find_chain(held.limb, VEINS);
+  lay_line(&held, &veins, true, &vein);
   bool same = vein.count == model->vein.count;
   for (uint32_t k = 0; same && k < vein.count; ++k)
     same = v_distance(vein.point[k].centre_m, model->vein.point[k].centre_m) < tolerance_m;

@@ -4,6 +4,7 @@
 
 #include "limb/bones.h"
 #include "sonde/limb_pose.h"
+#include "sonde/tissue.h"
 
 enum { LIMB_BED_ROWS = 240 };
 #define LIMB_BED_STEP 0.006
@@ -41,8 +42,12 @@ sonde_mat3 limb_pose_gradient(const sonde_limb_pose *pose, sonde_vec3 rest);
 double limb_pose_inverse(const sonde_limb_pose *pose, sonde_vec3 posed, sonde_vec3 *rest);
 // Lowest skin's height before and after it is squeezed, in the row of a posed point.
 double limb_pose_bed_height(const sonde_limb_pose *pose, sonde_vec3 posed);
-// Radius of a vein in the position against that at rest, at a rest point; 1 for arteries.
-double limb_pose_filling(const sonde_limb_pose *pose, sonde_limb_vessel_kind kind, bool popliteal,
-                         sonde_vec3 rest);
+// Radius of a vein in the position against that at rest, at a rest point; 1 for arteries. What the
+// bend of the knee does of it, and the rest by the pressure there.
+double limb_pose_filling(const sonde_limb_pose *pose, uint32_t vessel, sonde_vec3 rest);
+double limb_pose_knee(const sonde_limb_pose *pose, uint32_t vessel, sonde_vec3 rest);
+// Posed place of the saphenofemoral junction of a mean limb, from where columns of blood count.
+sonde_vec3 limb_pose_groin(const sonde_limb_pose *pose);
+sonde_posture limb_pose_posture(sonde_limb_position position);
 
 #endif

@@ -2,7 +2,14 @@
 #include "limb/pose.h"
 #include "limb/vessels_graph.h"
 
+#include "interior/law.h"
+
 #include <string.h>
+
+static bool is_popliteal(const struct limb_vessels *v, uint32_t b) {
+  return v->branch[b].kind == SONDE_LIMB_DEEP_VEIN &&
+         strstr(v->branch[b].name, "popliteal vein") != NULL;
+}
 
 sonde_vec3 sonde_limb_pose_point(const sonde_limb_pose *pose, sonde_vec3 rest_m) {
   SONDE_ASSERT(pose);
@@ -42,19 +49,32 @@ double sonde_limb_pose_bed(const sonde_limb_pose *pose, sonde_vec3 posed_m) {
 
 double sonde_limb_pose_pressure(const sonde_limb_pose *pose, sonde_vec3 posed_m) {
   SONDE_ASSERT(pose);
-  // At the groin 10 mmHg lying, 2.5 and 3.2 times as much sitting and standing. Below it 0.7 of the
-  // column of blood (1060 kg/m3): closed valves bear the rest, and the ankle has 76 to 79 mmHg.
-  const double column = 0.7 * 1060 * 9.81;
-  double groin = 10 * SONDE_PA_PER_MMHG;
-  if (pose->setting.position == SONDE_LIMB_SITTING) groin *= 2.5;
-  if (pose->setting.position == SONDE_LIMB_STANDING) groin *= 3.2;
-  sonde_vec3 femoral = vec3(0.03 * pose->limb->scale, 0.045, -0.02); // the saphenofemoral junction
-  sonde_vec3 below = v_sub(limb_pose_forward(pose, femoral), limb_side_point(pose->limb, posed_m));
-  return fmax(groin + column * v_dot(below, pose->up), 0);
+  const sonde_limb_position position = pose->setting.position;
+  return sonde_posture_pressure(
+      limb_pose_posture(position), SONDE_VESSEL_VEIN,
+      v_dot(v_sub(limb_pose_groin(pose), limb_side_point(pose->limb, posed_m)), pose->up));
 }
 
-double limb_pose_filling(const sonde_limb_pose *pose, sonde_limb_vessel_kind kind, bool popliteal,
-                         sonde_vec3 rest) {
+sonde_posture limb_pose_posture(sonde_limb_position position) {
+  return position == SONDE_LIMB_SITTING    ? SONDE_POSTURE_SITTING
+         : position == SONDE_LIMB_STANDING ? SONDE_POSTURE_STANDING
+                                           : SONDE_POSTURE_SUPINE;
+}
+
+sonde_vec3 limb_pose_groin(const sonde_limb_pose *pose) {
+  return limb_pose_forward(pose, vec3(0.03 * pose->limb->scale, 0.045, -0.02));
+}
+
+// A straight knee narrows the popliteal vein from 7.7 to 4.3 mm; 20 degrees free it.
+double limb_pose_knee(const sonde_limb_pose *pose, uint32_t vessel, sonde_vec3 rest) {
+  if (!is_popliteal(pose->limb->vessels, vessel)) return 1;
+  double u = clamp(1 - pose->knee_angle / (20 * DEGREE), 0, 1);
+  double beside = clamp((fabs(limb_level(pose->limb, rest.z) - 0.97) - 0.1) / 0.08, 0, 1);
+  return 1 - (1 - 4.3 / 7.7) * u * u * (3 - 2 * u) * (1 - beside * beside * (3 - 2 * beside));
+}
+
+double limb_pose_filling(const sonde_limb_pose *pose, uint32_t vessel, sonde_vec3 rest) {
+  const sonde_limb_vessel_kind kind = pose->limb->vessels->branch[vessel].kind;
   if (kind == SONDE_LIMB_ARTERY) return 1;
   double level = limb_level(pose->limb, rest.z);
   // Area by pressure above that of lying: the slope of each kind, less as the wall gets taut.
@@ -72,19 +92,7 @@ double limb_pose_filling(const sonde_limb_pose *pose, sonde_limb_vessel_kind kin
   double above =
       (sonde_limb_pose_pressure(pose, posed) - 10 * SONDE_PA_PER_MMHG) / SONDE_PA_PER_MMHG;
   double area = above >= 0 ? 1 + most * (1 - exp(-slope * above / most)) : exp(slope * above);
-  // A straight knee narrows the popliteal vein from 7.7 to 4.3 mm; 20 degrees free it.
-  double radius = sqrt(area);
-  if (popliteal) {
-    double u = clamp(1 - pose->knee_angle / (20 * DEGREE), 0, 1);
-    double beside = clamp((fabs(level - 0.97) - 0.1) / 0.08, 0, 1);
-    radius *= 1 - (1 - 4.3 / 7.7) * u * u * (3 - 2 * u) * (1 - beside * beside * (3 - 2 * beside));
-  }
-  return radius;
-}
-
-static bool is_popliteal(const struct limb_vessels *v, uint32_t b) {
-  return v->branch[b].kind == SONDE_LIMB_DEEP_VEIN &&
-         strstr(v->branch[b].name, "popliteal vein") != NULL;
+  return sqrt(area) * limb_pose_knee(pose, vessel, rest);
 }
 
 sonde_limb_label sonde_limb_pose_at(const sonde_limb_pose *pose, sonde_vec3 posed_m) {
@@ -105,8 +113,7 @@ sonde_limb_label sonde_limb_pose_at(const sonde_limb_pose *pose, sonde_vec3 pose
   const vessel_branch *branch = &limb->vessels->branch[near.vessel];
   if (branch->kind == SONDE_LIMB_ARTERY || near.lumen_m > 0.006) return label;
   sonde_limb_vessel_point place = sonde_limb_vessel_place(limb, near.vessel, near.arc_m);
-  double ratio = limb_pose_filling(pose, branch->kind, is_popliteal(limb->vessels, near.vessel),
-                                   limb_side_point(limb, place.centre_m));
+  double ratio = limb_pose_filling(pose, near.vessel, limb_side_point(limb, place.centre_m));
   double lumen = near.lumen_m - (ratio - 1) * place.radius_m, wall = near.wall_m / ratio;
   if (lumen < wall)
     return (sonde_limb_label){lumen < 0 ? SONDE_LIMB_LUMEN : SONDE_LIMB_WALL, near.vessel,
@@ -172,8 +179,7 @@ sonde_limb_vessel_point sonde_limb_pose_place(const sonde_limb_pose *pose, uint3
   const sonde_limb *limb = pose->limb;
   sonde_limb_vessel_point p = sonde_limb_vessel_place(limb, vessel, arc_m);
   sonde_vec3 rest = limb_side_point(limb, p.centre_m);
-  double ratio = limb_pose_filling(pose, limb->vessels->branch[vessel].kind,
-                                   is_popliteal(limb->vessels, vessel), rest);
+  double ratio = limb_pose_filling(pose, vessel, rest);
   sonde_vec3 along = m_mul_v(limb_pose_gradient(pose, rest), limb_side_point(limb, p.direction));
   p.centre_m = sonde_limb_pose_point(pose, p.centre_m);
   p.direction = limb_side_point(limb, v_unit(along, vec3(0, 0, -1)));
@@ -274,7 +280,9 @@ void sonde_limb_pose_stations(const sonde_limb_pose *pose,
     }
     s->depth_m = fmax(v_distance(s->skin_m, s->target_m) - vein.radius_m, 0.001);
     sonde_limb_force_band(s->depth_m, s->force_n);
-    double pressure = sonde_limb_pose_pressure(pose, s->target_m) / (10 * SONDE_PA_PER_MMHG);
-    for (int i = 0; i < 2; ++i) s->force_n[i] *= fmax(pressure, 0.5);
+    // The band is that of 10 mmHg in the vein; it closes at some 12 mmHg more than it has.
+    const double closing = 12 * SONDE_PA_PER_MMHG, lying = 10 * SONDE_PA_PER_MMHG;
+    double more = (sonde_limb_pose_pressure(pose, s->target_m) + closing) / (lying + closing);
+    for (int i = 0; i < 2; ++i) s->force_n[i] *= more;
   }
 }

@@ -3,13 +3,15 @@
 #include "interior/interior.h"
 
 // Venous pressure at the groin, mmHg: supine about 10, sitting and standing by the column of blood
-// up to the heart, part of it carried by the valves (docs/interior.md).
-static const double posture_mmhg[SONDE_POSTURE_COUNT] = {10, 25, 40};
+// up to the heart, part of it carried by the valves (docs/interior_theory.md).
+static const double posture_mmhg[SONDE_POSTURE_COUNT] = {10, 25, 32};
 static const double rise_s = 0.6; // of a strain, and of its release
-// Specific weight of blood, and the share of its column that veins carry standing: 76 to 79 mmHg at
-// the ankle, 40 at the groin. Groin and knee by their shares of a limb's axis, which begins a fifth
-// of the thigh above the hip and ends at the ankle.
-static const double blood_pa_m = 1055 * 9.81, standing_share = 0.58;
+// Specific weight of blood, and the share of its column below the groin that veins carry: none
+// lying, where 7 to 10 mmHg are found from groin to ankle; all of it sitting still, about 56 mmHg
+// at the ankle of a hanging calf; standing what gives 76 to 79 mmHg at the ankle, valves bear the
+// rest. Groin and knee by their shares of a limb's axis, which begins a fifth of the thigh above
+// the hip and ends at the ankle.
+static const double blood_pa_m = 1055 * 9.81, vein_share[SONDE_POSTURE_COUNT] = {0, 1, 0.7};
 static const double groin_share = 0.09, knee_share = 0.56;
 
 sonde_circulation sonde_circulation_default(void) {
@@ -50,21 +52,32 @@ double sonde_venous_pressure(const sonde_circulation *c, double t) {
   SONDE_ASSERT(c != NULL && c->posture < SONDE_POSTURE_COUNT && isfinite(t));
   double strain = strain_share(c, t);
   double breath = c->breath_pa * sin(2 * SONDE_PI * fmod(c->breath_rate_hz * t, 1));
-  return posture_mmhg[c->posture] * SONDE_PA_PER_MMHG + (1 - strain) * breath +
+  return sonde_posture_pressure(c->posture, SONDE_VESSEL_VEIN, 0) + (1 - strain) * breath +
          strain * c->valsalva_pa;
 }
 
+double sonde_posture_pressure(sonde_posture posture, sonde_vessel_kind kind, double below_m) {
+  SONDE_ASSERT(posture < SONDE_POSTURE_COUNT && isfinite(below_m));
+  if (kind == SONDE_VESSEL_ARTERY)
+    return posture == SONDE_POSTURE_SUPINE ? 0 : blood_pa_m * below_m;
+  return fmax(
+      posture_mmhg[posture] * SONDE_PA_PER_MMHG + vein_share[posture] * blood_pa_m * below_m, 0);
+}
+
 double sonde_hydrostatic_pressure(const sonde_interior *in, sonde_posture posture,
-                                  sonde_vessel_kind kind, double s) {
+                                  sonde_vessel_kind kind, sonde_vec3 rest) {
   SONDE_ASSERT(in != NULL && posture < SONDE_POSTURE_COUNT);
   const sonde_model *m = in->model;
-  if (m->bone_axis_m == NULL || posture == SONDE_POSTURE_SUPINE) return 0;
+  const sonde_gravity *g = &m->gravity;
+  if (m->bone_axis_m == NULL) return 0;
+  if (v_norm2(g->up) > 0)
+    return sonde_posture_pressure(g->posture, kind, v_dot(v_sub(g->groin_m, rest), g->up)) -
+           sonde_posture_pressure(SONDE_POSTURE_SUPINE, kind, 0);
   double top = m->bone_axis_m[0].z, length = m->bone_axis_m[m->bone_axis_count - 1].z - top;
-  double below = s + in->origin.z - top;
-  if (posture == SONDE_POSTURE_SITTING)
-    return blood_pa_m * fmax(0, below - knee_share * length); // the calf hangs
-  return blood_pa_m * (below - groin_share * length) *
-         (kind == SONDE_VESSEL_VEIN ? standing_share : 1);
+  double below = rest.z - top - groin_share * length;
+  if (posture == SONDE_POSTURE_SITTING) // a straight model's thigh is level and its calf hangs
+    below = fmax(0, rest.z - top - knee_share * length);
+  return sonde_posture_pressure(posture, kind, below) - sonde_posture_pressure(posture, kind, 0);
 }
 
 // The systolic and the dicrotic wave add up to a pulse that spans exactly 0..1 over a beat.

@@ -90,7 +90,7 @@ static sonde_vec3 spoke(const sonde_interior *in, double theta) {
 // Whether the axis is inside the skin at s, with room for the bone to all sides.
 static bool holds_bone(const sonde_interior *in, double s) {
   enum { RAYS = THETA_COUNT / 2 };
-  const double least = in->model->bone_axis_m ? least_bone_m : in->bone_radius_m;
+  const double least = in->model->bone_axis_m ? least_bone_m + least_tissue_m : in->bone_radius_m;
   sonde_vec3 from = middle_at(in, s);
   if (!sonde_surface_inside(in->skin, from)) return false;
   for (int k = 0; k < RAYS; ++k) {
@@ -103,10 +103,11 @@ static bool holds_bone(const sonde_interior *in, double s) {
 }
 
 // The skin of a whole leg bends away from the axis of a part: only as far as the axis stays inside.
+// Where the end of a bent limb is cut aslant its axis comes near to the skin within a row.
 static double clip_end(const sonde_interior *in, double end) {
   double step = end < 0 ? -row_step_m : row_step_m, last = end - copysign(end_margin_m, end);
   for (double s = 0; fabs(s) < fabs(last); s += step)
-    if (!holds_bone(in, s)) return s;
+    if (!holds_bone(in, s)) return in->model->bone_axis_m ? s - step : s;
   return holds_bone(in, last) ? end : last;
 }
 

@@ -6,6 +6,8 @@
 #include "sonde/interior.h"
 #include "sonde/tissue_anatomy.h"
 
+#include "base/link.h"
+
 // Area ratio of a vein between muscles or in the fat.
 double sonde_vein_area_in(const sonde_pathology *pathology, double outside_pa, bool in_fat);
 // Ellipse of a vein or artery with that area ratio: half axes over the rest radius.
@@ -15,10 +17,15 @@ void sonde_vessel_shape(sonde_vessel_kind kind, const sonde_pathology *pathology
 double sonde_vein_rest_scale(const sonde_pathology *pathology, bool clot, bool in_fat);
 // Radius of the artery at its pressure relative to that at 95 mmHg.
 double sonde_artery_rest_scale(const sonde_pathology *pathology);
-// Blood's pressure (Pa) at position s of a limb over that at the groin, by posture: in a vein the
-// valves carry a part. 0 in a thigh, which ends above the knee. @thread any
+// Pressure (Pa) at a point that lies `below_m` below the groin: in a vein all of it, in an artery
+// the blood's weight from there. The law of every vein at rest. @thread any
+SONDE_LINK double sonde_posture_pressure(sonde_posture posture, sonde_vessel_kind kind,
+                                         double below_m);
+// What a limb's place adds to the pressures of a pathology or a circulation (Pa), at a point of the
+// model: the blood's weight, and in a model that says how it is held also what the groin's veins
+// have more than lying. 0 in a thigh, which ends above the knee. @thread any
 double sonde_hydrostatic_pressure(const sonde_interior *interior, sonde_posture posture,
-                                  sonde_vessel_kind kind, double s_m);
+                                  sonde_vessel_kind kind, sonde_vec3 rest_m);
 // True where a thrombus lies.
 bool sonde_pathology_clot(const sonde_pathology *pathology, double z_m);
 

@@ -152,8 +152,8 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
   // change evenly.
   double low_pa = INFINITY, high_pa = -INFINITY, blend = 1;
   for (uint32_t i = 0; i < count; ++i) {
-    double s = in->section[which][i].s_m;
-    double p = sonde_hydrostatic_pressure(in, input->posture, in->course[which].kind, s);
+    double p = sonde_hydrostatic_pressure(in, input->posture, in->course[which].kind,
+                                          in->section[which][i].rest_m);
     low_pa = fmin(low_pa, p), high_pa = fmax(high_pa, p);
   }
   const rest_size low = rest_size_of(in, which, low_pa);
@@ -172,7 +172,7 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
     double scale = low.scale[clot][section->in_fat];
     if (high_pa > low_pa) {
       double p =
-          sonde_hydrostatic_pressure(in, input->posture, in->course[which].kind, section->s_m) -
+          sonde_hydrostatic_pressure(in, input->posture, in->course[which].kind, section->rest_m) -
           low_pa;
       held[clot].venous_pressure_pa += p, held[clot].arterial_pressure_pa += p;
       scale += p / (high_pa - low_pa) * (high.scale[clot][section->in_fat] - scale);

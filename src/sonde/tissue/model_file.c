@@ -16,6 +16,7 @@
 // Volumetric models have version 5 and limbs version 6, so that programs which do not know them
 // refuse them.
 enum { LIMB_VERSION = 6, BULK_VERSION = 5, FORMAT_VERSION = 4, OLDEST_VERSION = 2 };
+enum { GRAVITY_COLUMNS = 7 }; // posture, up, groin
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the model file is little-endian");
 
@@ -191,6 +192,12 @@ static void put_model(writer *w, uint32_t *probe, const sonde_model *model) {
   if (model->bone_axis_m) {
     sonde_model_put(w, "bone_axis", "f64", "m", model->bone_axis_count, 3, model->bone_axis_m);
     sonde_model_put(w, "map_origin", "f64", "SI", model->map_origin_count, 1, model->map_origin);
+  }
+  const sonde_gravity *g = &model->gravity;
+  if (v_norm2(g->up) > 0) {
+    const double row[GRAVITY_COLUMNS] = {g->posture,   g->up.x,      g->up.y,     g->up.z,
+                                         g->groin_m.x, g->groin_m.y, g->groin_m.z};
+    sonde_model_put(w, "gravity", "f64", "1, m", 1, GRAVITY_COLUMNS, row);
   }
   if (model->anatomy) sonde_anatomy_put_arrays(w, model->anatomy);
   if (model->bulk) sonde_bulk_put_arrays(w, model);
@@ -472,6 +479,21 @@ static bool take_limb(const reader *r, sonde_model *model) {
   model->bone_axis_count = points, model->map_origin_count = numbers;
   memcpy(model->bone_axis_m, axis, points * sizeof *model->bone_axis_m);
   if (numbers) memcpy(model->map_origin, origin, numbers * sizeof *model->map_origin);
+  if (find_array(r, "gravity")) {
+    double row[GRAVITY_COLUMNS] = {0};
+    const char *gravity = sonde_model_take(r, "gravity", "f64", GRAVITY_COLUMNS, &numbers);
+    if (!gravity) return false;
+    if (numbers == 1) memcpy(row, gravity, sizeof row);
+    const sonde_vec3 up = vec3(row[1], row[2], row[3]), groin = vec3(row[4], row[5], row[6]);
+    if (numbers != 1 || !(row[0] >= 0 && row[0] < SONDE_POSTURE_COUNT) ||
+        !(fabs(v_norm(up) - 1) < 1e-9) || !v_finite(groin)) {
+      sonde_fail(r->error, SONDE_FORMAT,
+                 "%s: gravity, expected a posture 0 to %d, a unit vector and a point", r->path,
+                 SONDE_POSTURE_COUNT - 1);
+      return false;
+    }
+    model->gravity = (sonde_gravity){(sonde_posture)row[0], up, groin};
+  }
   return numbers_within(r, "bone_axis", &model->bone_axis_m[0].x, 3 * (size_t)points, -100, 100);
 }
 
