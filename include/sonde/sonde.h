@@ -40,6 +40,7 @@
 #include "sonde/haptics_render.h"
 #include "sonde/files.h"
 #include "sonde/files_scanner.h"
+#include "sonde/solid.h"
 #include "sonde/flow.h"
 #include "sonde/limb.h"
 #include "sonde/limb_model.h"

@@ -11,6 +11,7 @@ declare -A options=(
   [measure]="--sites --probe --step-mm --limit-n -o --json"
   [identify]="--ramp-hold --slide --simulate --site --preset -o --json"
   [press]="--site --probe --force-n --depth-mm --image --case --preset --json"
+  [solve]="--site --block --probe --depths --contact --csv --json"
   [image]="--pose --site --force-n --case --depth-mm --size -o --json"
   [cut]="--line --path --site --length-mm --offset-mm --turn-deg --depth-mm --probe -o --json"
   [simulate]="-o --steps --seconds --every --picture --resume --json"

@@ -17,9 +17,13 @@ int main(void) {
   good = good && sonde_scene_load("/nowhere/a.yaml", NULL, &scene, &error) == SONDE_IO;
   good = good && sonde_site_table_load("/nowhere/a.csv", &table, &error) == SONDE_IO;
   good = good && sonde_recording_inspect("/nowhere/a.rec", false, &info, &error) == SONDE_IO;
+  sonde_hexes hexes;
+  sonde_hexes_def fine = sonde_hexes_def_default();
+  fine.edge_m = 0;
+  good = good && sonde_hexes_block(0.02, 0, 0, &fine, &hexes, &error) == SONDE_ARGUMENT;
   body.bmi = 99;
   good = good && sonde_limb_draw(&body, 1, &body, &error) == SONDE_ARGUMENT;
   sonde_image_clear(&image);
-  printf("files, limb, sweep, scene, fit, exam: %s\n", good ? "work" : "FAIL");
+  printf("files, solid, limb, sweep, scene, fit, exam: %s\n", good ? "work" : "FAIL");
   return !good;
 }

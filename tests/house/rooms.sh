@@ -11,7 +11,7 @@ rooms=0 listed=$'\n' folders=$'\n'
 while IFS='|' read -r head does pages; do
   read -r group room <<<"$head"
   [[ $room =~ ^[a-z_]+$ ]] || complain "src/rooms.txt: '$room' is no name of a room"
-  [[ $group =~ ^sonde(-(exam|files|fit|limb|sweep|scene))?$ ]] || complain "$room: '$group' is no library"
+  [[ $group =~ ^sonde(-(exam|files|fit|limb|sweep|scene|solid))?$ ]] || complain "$room: '$group' is no library"
   [[ $listed != *$'\n'$room$'\n'* ]] || complain "$room: listed twice"
   [[ -d $root/src/$group/$room ]] || complain "$room: src/$group/$room does not exist"
   [[ $does == *[a-z]* && $pages == *[a-z]* ]] || complain "$room: expected what it does and a page"

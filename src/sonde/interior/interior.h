@@ -148,8 +148,8 @@ static inline sonde_bend sonde_bend_at(const sonde_interior *in, double s_m) {
                       (b->x - a->x) / in->s_step_m, (b->y - a->y) / in->s_step_m};
 }
 // Facts of the column at angle theta and row s; r and depth_m of its skin. @thread any
-void sonde_interior_column(const sonde_interior *interior, double theta, double s,
-                           sonde_column_point *at);
+SONDE_LINK void sonde_interior_column(const sonde_interior *interior, double theta, double s,
+                                      sonde_column_point *at);
 // Displacement of the column field, whatever the method. @thread any
 sonde_vec3 sonde_interior_column_field(const sonde_interior *interior, sonde_vec3 rest_m);
 // Displacement anywhere; outside the skin it continues with the skin's. @thread any
@@ -161,8 +161,8 @@ sonde_vec3 sonde_interior_invert(const sonde_interior *interior, sonde_vec3 poin
 bool sonde_interior_in_bone(const sonde_interior *interior, sonde_vec3 rest_m,
                             const sonde_column_point *at);
 // Column coordinates and layers of a rest point; false beyond the leg's ends. @thread any
-bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
-                           sonde_column_point *at);
+SONDE_LINK bool sonde_interior_locate(const sonde_interior *interior, sonde_vec3 rest_m,
+                                      sonde_column_point *at);
 
 // Coordinates of a rest point in a lesion: unit ball. @thread any
 sonde_vec3 sonde_lesion_point(const sonde_interior *interior, uint32_t lesion, sonde_vec3 rest_m);

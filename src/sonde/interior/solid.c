@@ -6,12 +6,11 @@
 #include "interior/solid.h"
 
 #include "base/base.h"
+#include "elements/hexahedron.h"
 
 #include <string.h>
 
-static const double gauss = 0.57735026918962576;
-static const double sign[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
-                                  {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
+static const double (*const sign)[3] = sonde_hexahedron_sign;
 
 sonde_status sonde_solid_allocate(sonde_solid *s, uint32_t nodes, uint32_t hexes,
                                   sonde_error *error) {
@@ -72,25 +71,9 @@ sonde_status sonde_solid_connect(sonde_solid *s, const unsigned char *last,
 // Gradients of the shape functions at local (a, b, c); returns |det J|.
 static double gradients(const sonde_solid *s, const sonde_solid_hex *h, double a, double b,
                         double c, sonde_vec3 g[8]) {
-  sonde_vec3 local[8], j[3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  for (int n = 0; n < 8; ++n) {
-    double x = 1 + sign[n][0] * a, y = 1 + sign[n][1] * b, z = 1 + sign[n][2] * c;
-    local[n] = vec3(sign[n][0] * y * z / 8, x * sign[n][1] * z / 8, x * y * sign[n][2] / 8);
-    sonde_vec3 p = s->node[h->node[n]];
-    j[0] = v_madd(j[0], local[n].x, p);
-    j[1] = v_madd(j[1], local[n].y, p);
-    j[2] = v_madd(j[2], local[n].z, p);
-  }
-  double det = v_dot(j[0], v_cross(j[1], j[2]));
-  sonde_vec3 dual[3] = {v_scale(v_cross(j[1], j[2]), 1 / det),
-                        v_scale(v_cross(j[2], j[0]), 1 / det),
-                        v_scale(v_cross(j[0], j[1]), 1 / det)};
-  for (int n = 0; n < 8; ++n) {
-    g[n] = v_scale(dual[0], local[n].x);
-    g[n] = v_madd(g[n], local[n].y, dual[1]);
-    g[n] = v_madd(g[n], local[n].z, dual[2]);
-  }
-  return fabs(det);
+  sonde_vec3 corner[8];
+  for (int n = 0; n < 8; ++n) corner[n] = s->node[h->node[n]];
+  return fabs(sonde_hexahedron_gradients(corner, a, b, c, g));
 }
 
 // Plane stress of an incompressible sheet on the outer face: energy mu t (e:e + (tr e)^2).
@@ -132,7 +115,9 @@ void sonde_solid_matrix(const void *user, uint32_t hex, double (*k)[24]) {
   memset(mean, 0, sizeof mean);
   // Shape change at one integration point after the other.
   for (int p = 0; p < 8; ++p) {
-    double w = gradients(s, h, gauss * sign[p][0], gauss * sign[p][1], gauss * sign[p][2], g);
+    double w =
+        gradients(s, h, sonde_hexahedron_gauss * sign[p][0], sonde_hexahedron_gauss * sign[p][1],
+                  sonde_hexahedron_gauss * sign[p][2], g);
     double shear = w * h->shear_pa, bulk = s->plain ? w * h->bulk_pa : 0, d[8][3];
     for (int n = 0; n < 8; ++n) d[n][0] = g[n].x, d[n][1] = g[n].y, d[n][2] = g[n].z;
     for (int a = 0; a < 8; ++a)
@@ -156,7 +141,7 @@ void sonde_solid_matrix(const void *user, uint32_t hex, double (*k)[24]) {
   for (int i = 0; i < 24 && !s->plain; ++i)
     for (int j = 0; j < 24; ++j) k[i][j] += bulk * e[i] * e[j];
   for (int p = 0; p < 4 && h->skin_n_m > 0; ++p)
-    add_skin(s, h, gauss * sign[p][0], gauss * sign[p][1], k);
+    add_skin(s, h, sonde_hexahedron_gauss * sign[p][0], sonde_hexahedron_gauss * sign[p][1], k);
   // Nodes that stay where they are answer to nothing.
   for (int row = 0; row < 24; ++row)
     for (int i = 0; i < 24 && (s->held[h->node[row / 3]] >> row % 3 & 1); ++i)

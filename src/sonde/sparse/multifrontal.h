@@ -88,10 +88,15 @@ SONDE_LINK bool sonde_numeric_factor(sonde_numeric *numeric, const sonde_symboli
 
 // Condensed stiffness of the last nodes, lower triangle by columns: (i, j) at j*side + i, i >= j,
 // side = block*last_count; until new numbers begin.
-const double *sonde_numeric_condensed(const sonde_numeric *numeric);
+SONDE_LINK const double *sonde_numeric_condensed(const sonde_numeric *numeric);
 // Each x[k][block*node_count] holds displacements of the last nodes; fills in all others.
 void sonde_numeric_recover(const sonde_numeric *numeric, float *const *x, uint32_t count);
 // Solves in place, to single precision, when no nodes are condensed on.
 SONDE_LINK void sonde_numeric_solve(const sonde_numeric *numeric, double *x);
+// With loads on all nodes (block 3), in two halves: the first leaves in the last nodes of x the
+// load of the condensed stiffness, g = f_s - K_si K_ii^-1 f_i; the second takes their displacements
+// there and fills in all others. To single precision.
+SONDE_LINK void sonde_numeric_reduce(const sonde_numeric *numeric, double *x);
+SONDE_LINK void sonde_numeric_expand(const sonde_numeric *numeric, double *x);
 
 #endif

@@ -219,42 +219,67 @@ void sonde_numeric_recover(const sonde_numeric *f, float *const *x, uint32_t cou
         recover_piece(f, &f->symbolic->pieces.list[t], x[k], 3);
 }
 
-// All unknowns in their order lie in `gathered`.
-INLINE void solve(const sonde_numeric *f, double *x, uint32_t block) {
+// Takes x to or from the order of the pieces, in `gathered`.
+INLINE void gather(const sonde_numeric *f, double *x, uint32_t block, bool back) {
+  const uint32_t *order = f->symbolic->pieces.order;
+  for (uint32_t k = 0; k < f->symbolic->node_count; ++k)
+    for (uint32_t a = 0; a < block; ++a) {
+      double *at = &x[block * (size_t)order[k] + a];
+      if (back)
+        *at = (double)f->gathered[block * k + a];
+      else
+        f->gathered[block * k + a] = (float)*at;
+    }
+}
+
+// Solves with L (forward) or its transpose (backward) piece by piece, on what lies in `gathered`.
+INLINE void substitute(const sonde_numeric *f, uint32_t block, bool backward) {
   const sonde_pieces *pieces = &f->symbolic->pieces;
   float *y = f->gathered;
-  for (uint32_t k = 0; k < f->symbolic->node_count; ++k)
-    for (uint32_t a = 0; a < block; ++a)
-      y[block * k + a] = (float)x[block * (size_t)pieces->order[k] + a];
-  for (uint32_t pass = 0; pass < 2; ++pass)
-    for (uint32_t n = 0; n < pieces->count; ++n) {
-      const sonde_piece *p = &pieces->list[pass ? pieces->count - 1 - n : n];
-      const uint32_t *boundary = pieces->boundary + p->boundary;
-      uint32_t own = block * p->count, behind = block * p->boundary_count;
-      uint32_t width = sonde_front_width(own);
-      float *right = f->part, *solved = right + width, *rest = solved + width;
-      memcpy(right, y + (size_t)block * p->first, own * sizeof *right);
-      memset(right + own, 0, (width - own) * sizeof *right);
+  for (uint32_t n = 0; n < pieces->count; ++n) {
+    const sonde_piece *p = &pieces->list[backward ? pieces->count - 1 - n : n];
+    const uint32_t *boundary = pieces->boundary + p->boundary;
+    uint32_t own = block * p->count, behind = block * p->boundary_count;
+    uint32_t width = sonde_front_width(own);
+    float *right = f->part, *solved = right + width, *rest = solved + width;
+    memcpy(right, y + (size_t)block * p->first, own * sizeof *right);
+    memset(right + own, 0, (width - own) * sizeof *right);
+    for (uint32_t i = 0; i < behind; ++i)
+      rest[i] = y[block * (size_t)boundary[i / block] + i % block];
+    if (backward) {
+      f->kernels->backward(f->factor + p->factor, own, behind, right, solved, rest);
+    } else {
+      f->kernels->forward(f->factor + p->factor, own, behind, right, solved, rest);
       for (uint32_t i = 0; i < behind; ++i)
-        rest[i] = y[block * (size_t)boundary[i / block] + i % block];
-      if (pass) {
-        f->kernels->backward(f->factor + p->factor, own, behind, right, solved, rest);
-      } else {
-        f->kernels->forward(f->factor + p->factor, own, behind, right, solved, rest);
-        for (uint32_t i = 0; i < behind; ++i)
-          y[block * (size_t)boundary[i / block] + i % block] = rest[i];
-      }
-      memcpy(y + (size_t)block * p->first, solved, own * sizeof *y);
+        y[block * (size_t)boundary[i / block] + i % block] = rest[i];
     }
-  for (uint32_t k = 0; k < f->symbolic->node_count; ++k)
-    for (uint32_t a = 0; a < block; ++a)
-      x[block * (size_t)pieces->order[k] + a] = (double)y[block * k + a];
+    memcpy(y + (size_t)block * p->first, solved, own * sizeof *y);
+  }
 }
 
 void sonde_numeric_solve(const sonde_numeric *f, double *x) {
   SONDE_ASSERT(f->symbolic->last_count == 0 && !f->failed);
-  if (f->symbolic->block == 1)
-    solve(f, x, 1);
-  else
-    solve(f, x, 3);
+  if (f->symbolic->block == 1) {
+    gather(f, x, 1, false);
+    substitute(f, 1, false);
+    substitute(f, 1, true);
+    gather(f, x, 1, true);
+  } else {
+    sonde_numeric_reduce(f, x);
+    sonde_numeric_expand(f, x);
+  }
+}
+
+void sonde_numeric_reduce(const sonde_numeric *f, double *x) {
+  SONDE_ASSERT(f->symbolic->block == 3 && !f->failed);
+  gather(f, x, 3, false);
+  substitute(f, 3, false);
+  gather(f, x, 3, true);
+}
+
+void sonde_numeric_expand(const sonde_numeric *f, double *x) {
+  SONDE_ASSERT(f->symbolic->block == 3 && !f->failed);
+  gather(f, x, 3, false);
+  substitute(f, 3, true);
+  gather(f, x, 3, true);
 }

@@ -1,0 +1,308 @@
+// A solid with a probe: what may touch, the way of the probe in steps, reading the inside.
+#include "equilibrium.h"
+#include "hex.h"
+
+#include "base/base.h"
+#include "elements/hexahedron.h"
+
+#include <string.h>
+
+enum { FINEST = 64 };
+static const double least_contact_n_m3 = 1e6, most_contact_n_m3 = 1e13;
+static const double skin_below_m = 0.06;  // skin of the zone is at most this far below the tip
+static const double widest_ball_m = 0.03; // half width of a ball that touches
+static const double turn_radius_m = 0.03; // way of the probe per turn
+
+sonde_equilibrium_def sonde_equilibrium_def_default(void) {
+  sonde_equilibrium_def def = {.version = SONDE_DEF_VERSION,
+                               .contact_n_m3 = 1e9,
+                               .zone_m = 15e-3,
+                               .step_m = 3e-3,
+                               .tolerance = 1e-8};
+  for (int k = 0; k < SONDE_SOLID_LAYERS; ++k)
+    def.layer[k] = sonde_hyperelastic_default((sonde_solid_layer)k);
+  return def;
+}
+
+static sonde_status check(const sonde_equilibrium_def *def, sonde_error *error) {
+  sonde_status status = sonde_def_check("an equilibrium", def->version, error);
+  static const char *const NAMES[] = {"muscle", "fat", "skin"};
+  for (int k = 0; k < SONDE_SOLID_LAYERS && !status; ++k) {
+    const sonde_hyperelastic *m = &def->layer[k];
+    bool good = m->shear_pa > 0 && m->bulk_pa > 0 && isfinite(m->shear_pa) && isfinite(m->bulk_pa);
+    if (m->energy == SONDE_ENERGY_OGDEN)
+      good &= fabs(m->exponent) >= 0.1 && fabs(m->exponent) <= 40;
+    if (m->energy == SONDE_ENERGY_FUNG) good &= m->exponent >= 1e-3 && m->exponent <= 100;
+    if (!good)
+      status = sonde_fail(error, SONDE_ARGUMENT,
+                          "%s: shear modulus %g Pa, exponent %g, bulk modulus %g Pa: expected "
+                          "positive moduli and an exponent of 0.1 to 40 (Ogden) or 0.001 to 100 "
+                          "(Fung)",
+                          NAMES[k], m->shear_pa, m->exponent, m->bulk_pa);
+  }
+  const struct {
+    const char *name;
+    double value, low, high;
+  } range[] = {{"rounding_m", def->rounding_m, 0, 0.05},
+               {"contact_n_m3", def->contact_n_m3, least_contact_n_m3, most_contact_n_m3},
+               {"zone_m", def->zone_m, 1e-3, 0.2},
+               {"step_m", def->step_m, 1e-5, 0.1},
+               {"tolerance", def->tolerance, 1e-12, 1e-2}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(range) && !status; ++k)
+    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
+      status = sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
+                          range[k].value, range[k].low, range[k].high);
+  return status;
+}
+
+// ---- making -------------------------------------------------------------------------------
+
+sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_zone,
+                                    const sonde_equilibrium_def *def,
+                                    sonde_equilibrium **equilibrium, sonde_error *error) {
+  SONDE_ASSERT(mesh != NULL && mesh->count > 0 && equilibrium != NULL);
+  sonde_equilibrium *e = *equilibrium = SONDE_NEW(sonde_equilibrium, 1);
+  if (!e) return sonde_fail_memory(error);
+  e->mesh = mesh, e->def = *def;
+  const uint32_t nodes = mesh->node_count;
+  e->unknown = SONDE_NEW(uint32_t, nodes);
+  e->zone_node = SONDE_NEW(uint32_t, nodes);
+  e->face = SONDE_NEW(uint32_t, mesh->face_count);
+  e->corner = (uint32_t(*)[8])sonde_calloc(mesh->count, sizeof *e->corner);
+  e->moved = SONDE_NEW(sonde_vec3, nodes);
+  e->trial = SONDE_NEW(sonde_vec3, nodes);
+  e->kept = SONDE_NEW(sonde_vec3, nodes);
+  sonde_status status = sonde_fail_memory(error);
+  if (!e->unknown || !e->zone_node || !e->face || !e->corner || !e->moved || !e->trial || !e->kept)
+    goto done;
+  // Unknowns, those of the zone last; faces, those of the zone first.
+  for (int zone = 0; zone < 2; ++zone)
+    for (uint32_t n = 0; n < nodes; ++n) {
+      if (zone == 0) e->unknown[n] = SONDE_HELD_CORNER;
+      if (mesh->held[n] == 7 || (in_zone[n] != 0) != zone) continue;
+      if (zone) e->zone_node[e->zone_count++] = n;
+      e->unknown[n] = e->unknown_count++;
+    }
+  for (uint32_t h = 0; h < mesh->count; ++h)
+    for (int c = 0; c < 8; ++c) e->corner[h][c] = e->unknown[mesh->corner[h][c]];
+  uint32_t others = mesh->face_count;
+  for (uint32_t f = 0; f < mesh->face_count; ++f) {
+    bool inside = true;
+    for (int c = 0; c < 4; ++c) {
+      const uint32_t at = e->unknown[mesh->face[f][c]];
+      inside &= at != SONDE_HELD_CORNER && at >= sonde_zone_first(e);
+    }
+    if (inside)
+      e->face[e->zone_faces++] = f;
+    else
+      e->face[--others] = f;
+  }
+  if (e->zone_count == 0 || sonde_zone_first(e) == 0) {
+    status = sonde_fail(error, SONDE_ARGUMENT,
+                        "%u of %u nodes may touch: expected some, and some that do not",
+                        e->zone_count, e->unknown_count);
+    goto done;
+  }
+  const size_t count = 3 * (size_t)e->unknown_count, side = 3 * (size_t)e->zone_count;
+  double **vectors[] = {&e->force, &e->step,  &e->way,         &e->way_trial, &e->load,
+                        &e->touch, &e->right, &e->touch_trial, &e->schur,     &e->matrix};
+  const size_t size[] = {count, count, side, side,        side,
+                         side,  side,  side, side * side, side * side};
+  bool all = true;
+  for (size_t k = 0; k < SONDE_COUNT_OF(vectors); ++k)
+    all &= (*vectors[k] = SONDE_NEW(double, size[k])) != NULL;
+  e->imposed = SONDE_NEW(uint8_t, e->zone_count);
+  e->target = SONDE_NEW(sonde_vec3, e->zone_count);
+  sonde_vec3 *points = SONDE_NEW(sonde_vec3, e->unknown_count);
+  if (all && e->imposed && e->target && points) {
+    for (uint32_t n = 0; n < nodes; ++n)
+      if (e->unknown[n] != SONDE_HELD_CORNER) points[e->unknown[n]] = mesh->node[n];
+    const sonde_symbolic_def how = {.node_count = e->unknown_count,
+                                    .last_count = e->zone_count,
+                                    .block = 3,
+                                    .points = points,
+                                    .element_count = mesh->count,
+                                    .elements = (const uint32_t(*)[8])e->corner};
+    status = sonde_symbolic_create(&how, &e->symbolic, error);
+    if (!status) status = sonde_numeric_reserve(&e->numeric, e->symbolic, error);
+  }
+  sonde_free(points);
+done:
+  if (!status) return SONDE_OK;
+  sonde_equilibrium_destroy(e);
+  *equilibrium = NULL;
+  return status;
+}
+
+void sonde_equilibrium_destroy(sonde_equilibrium *e) {
+  if (!e) return;
+  void *parts[] = {e->unknown,   e->zone_node,   e->face,    e->corner, e->moved,
+                   e->trial,     e->kept,        e->force,   e->step,   e->way,
+                   e->way_trial, e->load,        e->touch,   e->right,  e->schur,
+                   e->matrix,    e->touch_trial, e->imposed, e->target};
+  for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
+  sonde_surface_index_destroy(e->shape.hull);
+  sonde_numeric_clear(&e->numeric);
+  sonde_symbolic_destroy(e->symbolic);
+  sonde_free(e);
+}
+
+sonde_status sonde_equilibrium_create(const sonde_hexes *mesh, const sonde_probe *probe,
+                                      sonde_pose start, const sonde_equilibrium_def *def,
+                                      sonde_equilibrium **equilibrium, sonde_error *error) {
+  SONDE_ASSERT(mesh != NULL && probe != NULL && equilibrium != NULL);
+  *equilibrium = NULL;
+  sonde_status status = check(def, error);
+  if (status) return status;
+  const bool ball = probe->ball_radius_m > 0;
+  const double half_x = ball ? fmin(probe->ball_radius_m, widest_ball_m) : probe->half_x_m;
+  const double half_y = ball ? half_x : probe->half_y_m;
+  // Lines of nodes along the footprint's border belong to it, though the skin's curvature moves
+  // them.
+  const double slack = 0.15 * fmin(half_x, half_y);
+  const double reach = def->bonded ? slack : def->rounding_m + def->zone_m;
+  uint8_t *in_zone = SONDE_NEW(uint8_t, mesh->node_count);
+  if (!in_zone) return sonde_fail_memory(error);
+  for (uint32_t f = 0; f < mesh->face_count; ++f)
+    for (int c = 0; c < 4; ++c) {
+      const uint32_t n = mesh->face[f][c];
+      const sonde_vec3 p = pose_apply_inverse(start, mesh->node[n]);
+      in_zone[n] = fabs(p.x) < half_x + reach && fabs(p.y) < half_y + reach && p.z < skin_below_m &&
+                   p.z > -skin_below_m;
+    }
+  status = sonde_equilibrium_make(mesh, in_zone, def, equilibrium, error);
+  sonde_free(in_zone);
+  if (status) return status;
+  sonde_equilibrium *e = *equilibrium;
+  e->shape = (sonde_touch_shape){.probe = probe, .rounding_m = def->rounding_m};
+  e->start = e->pose = start;
+  for (uint32_t k = 0; k < e->zone_count; ++k) e->imposed[k] = def->bonded;
+  if (!ball && def->rounding_m > 0)
+    status = sonde_surface_index_create(&probe->body.hull, &e->shape.hull, error);
+  if (!status) return SONDE_OK;
+  sonde_equilibrium_destroy(e);
+  *equilibrium = NULL;
+  return status;
+}
+
+// ---- the probe's way ------------------------------------------------------------------------
+
+sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
+                                    sonde_equilibrium_result *result, sonde_error *error) {
+  SONDE_ASSERT(e != NULL && result != NULL);
+  const sonde_pose from = e->pose;
+  const sonde_quat q = q_mul(q_conj(from.rotation), pose.rotation);
+  const double turn = 2 * atan2(sqrt(q.x * q.x + q.y * q.y + q.z * q.z), fabs(q.w));
+  const double way = v_distance(from.position, pose.position) + turn_radius_m * turn;
+  const bool same_side = q.w >= 0;
+  if (!isfinite(way)) return sonde_fail(error, SONDE_ARGUMENT, "the probe's pose is not finite");
+  const size_t bytes = e->mesh->node_count * sizeof *e->moved;
+  sonde_vec3 *begin = SONDE_NEW(sonde_vec3, e->mesh->node_count);
+  if (!begin) return sonde_fail_memory(error);
+  memcpy(begin, e->moved, bytes);
+  const double whole = 1 / fmax(1, ceil(way / e->def.step_m - 1e-9));
+  *result = (sonde_equilibrium_result){0};
+  sonde_status status = SONDE_OK;
+  for (double done = 0, part = whole; done < 1 && !status;) {
+    const double to = done + part > 1 - 1e-9 ? 1 : done + part;
+    const double back = 1 - to, along = same_side ? to : -to;
+    const sonde_quat a = from.rotation, b = pose.rotation;
+    const sonde_pose next = {
+        v_lerp(from.position, pose.position, to),
+        q_unit((sonde_quat){back * a.w + along * b.w, back * a.x + along * b.x,
+                            back * a.y + along * b.y, back * a.z + along * b.z})};
+    memcpy(e->kept, e->moved, bytes);
+    for (uint32_t k = 0; k < e->zone_count; ++k) {
+      const sonde_vec3 rest = e->mesh->node[e->zone_node[k]];
+      e->target[k] = v_sub(pose_apply(next, pose_apply_inverse(e->start, rest)), rest);
+    }
+    if (sonde_equilibrium_solve(e, next, result)) {
+      done = to, part = fmin(2 * part, whole), e->pose = next;
+      continue;
+    }
+    memcpy(e->moved, e->kept, bytes);
+    part /= 2;
+    if (part < whole / FINEST)
+      status = sonde_fail(error, SONDE_CONVERGENCE,
+                          "no equilibrium was found %.3f mm along the probe's way (residual %.1e)",
+                          1e3 * way * to, result->residual);
+  }
+  sonde_touch outside = {0};
+  for (uint32_t k = e->zone_faces; k < e->mesh->face_count && !status && !e->def.bonded; ++k) {
+    sonde_vec3 rest[4], now[4];
+    double f[12];
+    sonde_equilibrium_face(e, e->moved, e->face[k], rest, now);
+    if (sonde_touch_face(&e->shape, pose, e->def.contact_n_m3, rest, now, false, &outside, f, NULL))
+      status = sonde_fail(error, SONDE_CONVERGENCE,
+                          "skin beyond the zone of %.1f mm around the footprint touches the probe",
+                          1e3 * e->def.zone_m);
+  }
+  // Bonded: what holds the skin is what the probe feels.
+  for (uint32_t k = 0; k < e->zone_count && !status && e->def.bonded; ++k) {
+    const double *f = e->force + 3 * (size_t)(sonde_zone_first(e) + k);
+    const sonde_vec3 hold = vec3(f[0], f[1], f[2]);
+    const uint32_t n = e->zone_node[k];
+    const sonde_vec3 arm = v_sub(v_add(e->mesh->node[n], e->moved[n]), e->pose.position);
+    result->force_n = v_sub(result->force_n, hold);
+    result->torque_nm = v_sub(result->torque_nm, v_cross(arm, hold));
+  }
+  if (status) memcpy(e->moved, begin, bytes), e->pose = from;
+  sonde_free(begin);
+  return status;
+}
+
+// ---- reading ------------------------------------------------------------------------------
+
+// Local coordinates of a point in a hexahedron; false: it lies outside.
+static bool locate(const sonde_vec3 corner[8], sonde_vec3 p, double shape[8]) {
+  double at[3] = {0, 0, 0};
+  for (int step = 0; step < 20; ++step) {
+    sonde_vec3 g[8], x = vec3(0, 0, 0);
+    (void)sonde_hexahedron_gradients(corner, at[0], at[1], at[2], g);
+    double move[3] = {0, 0, 0};
+    for (int n = 0; n < 8; ++n) {
+      const double *s = sonde_hexahedron_sign[n];
+      shape[n] = (1 + s[0] * at[0]) * (1 + s[1] * at[1]) * (1 + s[2] * at[2]) / 8;
+      x = v_madd(x, shape[n], corner[n]);
+    }
+    // Local coordinates are functions of place with gradients sum of sign g.
+    for (int n = 0; n < 8; ++n)
+      for (int k = 0; k < 3; ++k) move[k] += sonde_hexahedron_sign[n][k] * v_dot(g[n], v_sub(p, x));
+    double most = 0;
+    for (int k = 0; k < 3; ++k) at[k] += move[k], most = fmax(most, fabs(move[k]));
+    if (most < 1e-12) break;
+    if (fabs(at[0]) > 3 || fabs(at[1]) > 3 || fabs(at[2]) > 3) return false;
+  }
+  const double edge = 1 + 1e-6;
+  return fabs(at[0]) <= edge && fabs(at[1]) <= edge && fabs(at[2]) <= edge;
+}
+
+bool sonde_equilibrium_at(const sonde_equilibrium *e, sonde_vec3 rest_m,
+                          sonde_vec3 *displacement_m) {
+  SONDE_ASSERT(e != NULL && displacement_m != NULL);
+  for (uint32_t h = 0; h < e->mesh->count; ++h) {
+    sonde_vec3 corner[8], low, high;
+    double shape[8];
+    for (int c = 0; c < 8; ++c) {
+      corner[c] = e->mesh->node[e->mesh->corner[h][c]];
+      low = c ? v_min(low, corner[c]) : corner[c];
+      high = c ? v_max(high, corner[c]) : corner[c];
+    }
+    const double slack = 1e-9;
+    if (rest_m.x < low.x - slack || rest_m.y < low.y - slack || rest_m.z < low.z - slack ||
+        rest_m.x > high.x + slack || rest_m.y > high.y + slack || rest_m.z > high.z + slack ||
+        !locate(corner, rest_m, shape))
+      continue;
+    *displacement_m = vec3(0, 0, 0);
+    for (int c = 0; c < 8; ++c)
+      *displacement_m = v_madd(*displacement_m, shape[c], e->moved[e->mesh->corner[h][c]]);
+    return true;
+  }
+  return false;
+}
+
+void sonde_equilibrium_size(const sonde_equilibrium *e, uint32_t *unknowns,
+                            uint32_t *zone_unknowns) {
+  SONDE_ASSERT(e != NULL && unknowns != NULL && zone_unknowns != NULL);
+  *unknowns = 3 * e->unknown_count, *zone_unknowns = 3 * e->zone_count;
+}

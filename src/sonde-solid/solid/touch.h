@@ -1,0 +1,35 @@
+// Contact with a rigid convex probe as one potential: over the skin's faces at rest the integral of
+// stiffness/2 depth^2, where depth is the exact distance from the probe's surface to a point in it.
+#ifndef SONDE_SRC_TOUCH_H
+#define SONDE_SRC_TOUCH_H
+
+#include "base/maths.h"
+#include "sonde/solid.h"
+
+// A convex core and a rounding around it.
+typedef struct sonde_touch_shape {
+  const sonde_probe *probe;
+  sonde_surface_index *hull; // of the core; NULL where no distance outside it is asked for
+  double rounding_m;
+} sonde_touch_shape;
+
+// How deep a point of the probe's frame lies in it; @return false: not at all.
+// @param out unit, the way out; bend the change of `out` with the point (1/m)
+bool sonde_touch_depth(const sonde_touch_shape *shape, sonde_vec3 point, double *depth_m,
+                       sonde_vec3 *out, sonde_mat3 *bend);
+
+// Sums of the contact over some faces.
+typedef struct sonde_touch {
+  double energy_j, area_m2, deepest_m;
+  sonde_vec3 force_n, torque_nm; // on the probe, about its origin
+} sonde_touch;
+
+// A face of the skin whose corners have moved from rest to now.
+// @param f[12] receives forces on the corners, when there is contact
+// @param k NULL or receives the stiffness, with or without what the probe's bending takes away
+// @return whether there is contact
+bool sonde_touch_face(const sonde_touch_shape *shape, sonde_pose pose, double stiffness_n_m3,
+                      const sonde_vec3 rest[4], const sonde_vec3 now[4], bool bend,
+                      sonde_touch *sum, double f[12], double (*k)[12]);
+
+#endif

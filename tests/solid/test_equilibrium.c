@@ -1,0 +1,311 @@
+// A solid with a probe: uniform strains are reproduced, a thick-walled tube, a ball and a punch
+// meet their closed forms, energy equals work, one depth has one force whatever the way, and a
+// probe that contains another never does less work.
+#include "fixture.h"
+#include "solid/equilibrium.h"
+#include "solid/grid.h"
+
+#include <stdio.h>
+
+static const double kpa = 1e3;
+
+static void check(sonde_status status, const sonde_error *error) {
+  if (status) fail_msg("%s", error->message);
+}
+
+static sonde_equilibrium_def one_material(sonde_hyperelastic m) {
+  sonde_equilibrium_def def = sonde_equilibrium_def_default();
+  for (int k = 0; k < SONDE_SOLID_LAYERS; ++k) def.layer[k] = m;
+  return def;
+}
+
+static sonde_hyperelastic ogden(double shear_pa, double exponent, double bulk) {
+  return (sonde_hyperelastic){SONDE_ENERGY_OGDEN, shear_pa, exponent, bulk * shear_pa};
+}
+
+// ---- uniform strain -------------------------------------------------------------------------
+
+// Nodes inside follow a large uniform deformation of the boundary, whatever the elements' shape.
+static void uniform_strain_is_reproduced(void **state) {
+  (void)state;
+  static const double f[3][3] = {{1.25, 0.3, 0}, {-0.1, 0.85, 0.2}, {0.05, 0, 0.95}};
+  sonde_error error;
+  sonde_hexes mesh;
+  sonde_hexes_def fine = sonde_hexes_def_default();
+  fine.half_u_m = fine.half_v_m = 5e-3, fine.reach_m = 15e-3;
+  check(sonde_hexes_block(20e-3, 0, 0, &fine, &mesh, &error), &error);
+  uint8_t *border = calloc(mesh.node_count, 1);
+  for (uint32_t n = 0; n < mesh.node_count; ++n) {
+    sonde_vec3 *p = &mesh.node[n];
+    border[n] = fabs(p->x) > 14.9e-3 || fabs(p->y) > 14.9e-3 || p->z > -1e-6 || p->z < -19.9e-3;
+    mesh.held[n] = 0;
+    if (!border[n]) // crooked elements
+      *p = v_add(*p, vec3(4e-4 * sin(900 * p->y), 4e-4 * sin(700 * p->z), 4e-4 * sin(800 * p->x)));
+  }
+  for (int kind = 0; kind < 3; ++kind) {
+    const sonde_equilibrium_def def =
+        one_material((sonde_hyperelastic){(sonde_strain_energy)kind, 3000, 4, 72e3});
+    sonde_equilibrium *e;
+    check(sonde_equilibrium_make(&mesh, border, &def, &e, &error), &error);
+    e->def.bonded = true;
+    for (uint32_t k = 0; k < e->zone_count; ++k) {
+      const sonde_vec3 x = mesh.node[e->zone_node[k]];
+      e->imposed[k] = 1;
+      e->target[k] = v_sub(m_mul_v((sonde_mat3){{{f[0][0], f[0][1], f[0][2]},
+                                                 {f[1][0], f[1][1], f[1][2]},
+                                                 {f[2][0], f[2][1], f[2][2]}}},
+                                   x),
+                           x);
+    }
+    sonde_equilibrium_result r = {0};
+    assert_true(sonde_equilibrium_solve(e, (sonde_pose){.rotation = {1, 0, 0, 0}}, &r));
+    for (uint32_t n = 0; n < mesh.node_count; ++n) {
+      const sonde_vec3 x = mesh.node[n];
+      const sonde_vec3 want = vec3(f[0][0] * x.x + f[0][1] * x.y + f[0][2] * x.z - x.x,
+                                   f[1][0] * x.x + f[1][1] * x.y + f[1][2] * x.z - x.y,
+                                   f[2][0] * x.x + f[2][1] * x.y + f[2][2] * x.z - x.z);
+      assert_near(v_distance(e->moved[n], want), 0, 1e-10);
+    }
+    sonde_equilibrium_destroy(e);
+  }
+  free(border);
+  sonde_hexes_clear(&mesh);
+}
+
+// ---- tube and sphere ------------------------------------------------------------------------
+
+typedef struct tube {
+  double inner, outer;
+  uint32_t around;
+} tube;
+
+static sonde_vec3 place_in_tube(const void *user, double level, uint32_t u, uint32_t v) {
+  const tube *t = user;
+  const double r = t->inner + (t->outer - t->inner) * level / 3, a = 2 * SONDE_PI * u / t->around;
+  return vec3(r * cos(a), r * sin(a), 2e-3 * v);
+}
+
+// Pressure that widens an incompressible tube in plane strain from A to a: the integral over the
+// wall of (sigma_hoop - sigma_radial)/r, here by Simpson's rule.
+static double tube_pressure(const sonde_hyperelastic *m, double inner, double outer, double now) {
+  enum { PARTS = 400 };
+  const double grown = now * now - inner * inner;
+  double sum = 0;
+  for (int k = 0; k <= PARTS; ++k) {
+    const double rest = inner + (outer - inner) * k / PARTS, r = sqrt(rest * rest + grown);
+    const double l = r / rest, a = m->exponent;
+    const double apart = 2 * m->shear_pa / a * (pow(l, a) - pow(l, -a));
+    const double dr = rest / r * (outer - inner) / PARTS; // dr = R dR / r
+    sum += (k % 2 ? 4 : k % PARTS ? 2 : 1) * apart / r * dr / 3;
+  }
+  return sum;
+}
+
+static void thick_tube_at_large_strain(void **state) {
+  (void)state;
+  const tube t = {10e-3, 20e-3, 32};
+  static const double exponents[2] = {2, 6};
+  for (int kind = 0; kind < 2; ++kind) {
+    double last = 0;
+    for (int fine = 1; fine <= 2; ++fine) {
+      sonde_error error;
+      sonde_hexes mesh;
+      sonde_levels levels = {.count = 3 * (uint32_t)fine * 2 + 1};
+      for (uint32_t k = 0; k < levels.count; ++k) levels.at[k] = 3.0 * k / (levels.count - 1);
+      const sonde_grid_shape shape = {&levels, t.around, 2, true, place_in_tube, &t};
+      check(sonde_hexes_bend(&shape, &mesh, &error), &error);
+      uint8_t *inside = calloc(mesh.node_count, 1);
+      for (uint32_t n = 0; n < mesh.node_count; ++n) {
+        mesh.held[n] = 4;
+        inside[n] = hypot(mesh.node[n].x, mesh.node[n].y) < t.inner * 1.001;
+      }
+      // K = 2000 mu: nearly incompressible.
+      const sonde_hyperelastic m = ogden(3 * kpa, exponents[kind], 2000);
+      const sonde_equilibrium_def def = one_material(m);
+      sonde_equilibrium *e;
+      check(sonde_equilibrium_make(&mesh, inside, &def, &e, &error), &error);
+      e->def.bonded = true;
+      const double now = 14e-3;
+      sonde_equilibrium_result r = {0};
+      for (int step = 1; step <= 2; ++step) {
+        for (uint32_t k = 0; k < e->zone_count; ++k) {
+          e->imposed[k] = 1;
+          e->target[k] = v_scale(mesh.node[e->zone_node[k]], step * (now - t.inner) / t.inner / 2);
+          e->target[k].z = 0;
+        }
+        assert_true(sonde_equilibrium_solve(e, (sonde_pose){.rotation = {1, 0, 0, 0}}, &r));
+      }
+      double radial = 0;
+      for (uint32_t k = 0; k < e->zone_count; ++k) {
+        const sonde_vec3 p = v_unit(mesh.node[e->zone_node[k]], vec3(1, 0, 0));
+        const sonde_vec3 q = v_unit(vec3(p.x, p.y, 0), vec3(1, 0, 0));
+        const double *f = e->force + 3 * (size_t)(sonde_zone_first(e) + k);
+        radial += f[0] * q.x + f[1] * q.y;
+      }
+      // The polygon's perimeter is what the pressure acts on.
+      const double side = 2 * now * sin(SONDE_PI / t.around);
+      const double got = radial / (side * t.around * cos(SONDE_PI / t.around) * 2e-3);
+      const double want = tube_pressure(&m, t.inner, t.outer, now);
+      print_message("tube, exponent %g, %u levels: %.2f Pa, closed form %.2f (%+.2f %%)\n",
+                    exponents[kind], levels.count - 1, got, want, 100 * (got / want - 1));
+      last = got / want - 1;
+      free(inside);
+      sonde_equilibrium_destroy(e);
+      sonde_hexes_clear(&mesh);
+    }
+    assert_true(fabs(last) <= 0.015);
+  }
+}
+
+// ---- contact --------------------------------------------------------------------------------
+
+typedef struct bench {
+  sonde_hexes mesh;
+  sonde_probe probe;
+  sonde_equilibrium *e;
+} bench;
+
+static sonde_pose above(double depth_m) {
+  // The probe's z axis points into the block, along -z; its x axis along x.
+  return (sonde_pose){vec3(0, 0, -depth_m), {0, 1, 0, 0}};
+}
+
+static void make_bench(bench *b, const char *probe, double depth_m, const sonde_hexes_def *fine,
+                       const sonde_equilibrium_def *def) {
+  sonde_error error;
+  check(sonde_probe_create(probe, &b->probe, &error), &error);
+  check(sonde_hexes_block(depth_m, 0, 0, fine, &b->mesh, &error), &error);
+  check(sonde_equilibrium_create(&b->mesh, &b->probe, above(0), def, &b->e, &error), &error);
+}
+
+static void drop_bench(bench *b) {
+  sonde_equilibrium_destroy(b->e);
+  sonde_hexes_clear(&b->mesh);
+  sonde_probe_clear(&b->probe);
+}
+
+static sonde_equilibrium_result find(bench *b, double depth_m) {
+  sonde_error error;
+  sonde_equilibrium_result r;
+  check(sonde_equilibrium_find(b->e, above(depth_m), &r, &error), &error);
+  return r;
+}
+
+static double poisson(double bulk) { return (3 * bulk - 2) / (2 * (3 * bulk + 1)); }
+
+// Hertz 1881: F = 4/3 E/(1 - nu^2) sqrt(R) d^(3/2) for a ball on a half space.
+static void ball_on_a_half_space(void **state) {
+  (void)state;
+  bench b;
+  sonde_hexes_def fine = sonde_hexes_def_default();
+  fine.half_u_m = fine.half_v_m = 4e-3, fine.edge_m = 1.34e-3, fine.growth = 1.9;
+  fine.reach_m = 0.08, fine.muscle = 10;
+  sonde_equilibrium_def def = one_material(ogden(3 * kpa, 2, 24));
+  def.zone_m = 1e-3;
+  make_bench(&b, "ball:40", 0.08, &fine, &def);
+  const double d = 0.25e-3, nu = poisson(24), young = 2 * 3 * kpa * (1 + nu);
+  const double want = 4.0 / 3 * young / (1 - nu * nu) * sqrt(40e-3) * pow(d, 1.5);
+  const sonde_equilibrium_result r = find(&b, d);
+  print_message("Hertz: %.5f N, closed form %.5f (%+.1f %%), %u unknowns\n", r.force_n.z, want,
+                100 * (r.force_n.z / want - 1), 3 * b.e->unknown_count);
+  assert_near(r.force_n.z / want, 1, 0.1);
+  assert_near(r.force_n.x, 0, 1e-6 * want);
+  drop_bench(&b);
+}
+
+// Energy equals work: the force is the change of the energy with depth, by a difference of fourth
+// order, bonded and sliding.
+static void energy_equals_work(void **state) {
+  (void)state;
+  for (int bonded = 0; bonded < 2; ++bonded) {
+    bench b;
+    sonde_hexes_def fine = sonde_hexes_def_default();
+    fine.half_u_m = fine.half_v_m = 6e-3, fine.edge_m = 3e-3, fine.reach_m = 0.03;
+    fine.muscle = 3;
+    sonde_equilibrium_def def = one_material(ogden(3 * kpa, 8, 24));
+    def.bonded = bonded, def.rounding_m = bonded ? 0 : 2e-3, def.tolerance = 1e-10;
+    make_bench(&b, "rect:12x12", 0.03, &fine, &def);
+    const double h = bonded ? 1e-4 : 2e-6, at = 5e-3;
+    double energy[4], force = find(&b, at).force_n.z;
+    static const double where[4] = {-2, -1, 1, 2};
+    for (int k = 0; k < 4; ++k) {
+      const sonde_equilibrium_result r = find(&b, at + where[k] * h);
+      energy[k] = r.tissue_j + r.contact_j;
+    }
+    const double slope = (energy[0] - 8 * energy[1] + 8 * energy[2] - energy[3]) / (12 * h);
+    print_message("%s: force %.9f N, change of the energy %.9f N\n", bonded ? "bonded" : "slip",
+                  force, slope);
+    assert_near(slope / force, 1, 1e-6);
+    drop_bench(&b);
+  }
+}
+
+// One force for one depth: in one step, in small ones, from deeper, from aside.
+static void one_force_for_one_depth(void **state) {
+  (void)state;
+  bench b;
+  sonde_error error;
+  sonde_hexes_def fine = sonde_hexes_def_default();
+  fine.half_u_m = 10e-3, fine.half_v_m = 5e-3, fine.edge_m = 3.4e-3, fine.reach_m = 0.04;
+  fine.muscle = 3;
+  sonde_equilibrium_def def = one_material(ogden(3 * kpa, 9, 24));
+  def.rounding_m = 2e-3;
+  make_bench(&b, "rect:20x10", 0.04, &fine, &def);
+  const double d = 6e-3;
+  const sonde_equilibrium_result small = find(&b, d);
+  (void)find(&b, 9e-3);
+  const sonde_equilibrium_result back = find(&b, d);
+  sonde_pose aside = above(8e-3);
+  aside.position.x = 3e-3;
+  sonde_equilibrium_result other;
+  check(sonde_equilibrium_find(b.e, aside, &other, &error), &error);
+  const sonde_equilibrium_result slid = find(&b, d);
+  (void)find(&b, -1e-3);
+  b.e->def.step_m = 1;
+  const sonde_equilibrium_result whole = find(&b, d);
+  print_message("steps %.9f N, from deeper %.9f, from aside %.9f, at once %.9f (%u steps)\n",
+                small.force_n.z, back.force_n.z, slid.force_n.z, whole.force_n.z, whole.steps);
+  assert_near(back.force_n.z / small.force_n.z, 1, 1e-6);
+  assert_near(slid.force_n.z / small.force_n.z, 1, 1e-6);
+  assert_near(whole.force_n.z / small.force_n.z, 1, 1e-6);
+  assert_near((whole.tissue_j + whole.contact_j) / (small.tissue_j + small.contact_j), 1, 1e-6);
+  drop_bench(&b);
+}
+
+// A probe that contains another takes at least as much work, at every depth.
+static void a_larger_probe_never_does_less_work(void **state) {
+  (void)state;
+  static const char *const names[4] = {"rect:12x6", "rect:20x10", "rect:20x10", "rect:24x14"};
+  static const double rounding[4] = {0, 0, 2e-3, 2e-3};
+  double before[2] = {0, 0};
+  for (int k = 0; k < 4; ++k) {
+    bench b;
+    sonde_hexes_def fine = sonde_hexes_def_default();
+    fine.half_u_m = 10e-3, fine.half_v_m = 5e-3, fine.edge_m = 3.4e-3, fine.reach_m = 0.04;
+    fine.muscle = 3;
+    sonde_equilibrium_def def = one_material(ogden(3 * kpa, 9, 24));
+    def.rounding_m = rounding[k];
+    make_bench(&b, names[k], 0.03, &fine, &def);
+    for (int d = 0; d < 2; ++d) {
+      const sonde_equilibrium_result r = find(&b, d ? 6e-3 : 2e-3);
+      const double work = r.tissue_j + r.contact_j;
+      print_message("%s round %.0f mm at %d mm: %.3f mJ\n", names[k], 1e3 * rounding[k], d ? 6 : 2,
+                    1e3 * work);
+      assert_true(work > before[d]);
+      before[d] = work;
+    }
+    drop_bench(&b);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(uniform_strain_is_reproduced),
+      cmocka_unit_test(thick_tube_at_large_strain),
+      cmocka_unit_test(ball_on_a_half_space),
+      cmocka_unit_test(energy_equals_work),
+      cmocka_unit_test(one_force_for_one_depth),
+      cmocka_unit_test(a_larger_probe_never_does_less_work),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
