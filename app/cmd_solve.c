@@ -71,6 +71,7 @@ static bool read_depths(void *to, const char *text) {
 
 static bool read_point(void *to, const char *text) {
   options *o = to;
+  assert(o->point_count <= POINTS_MOST);
   double x[3];
   uint32_t count;
   if (!read_list("--point", text, -2000, 2000, x, 3, &count)) return false;
@@ -164,6 +165,7 @@ typedef struct work {
 
 // Turned about its own axis 0 or 1.
 static sonde_pose turned(sonde_pose pose, int axis, double angle_rad) {
+  assert(axis == 0 || axis == 1);
   const double c = cos(angle_rad / 2), s = sin(angle_rad / 2);
   const sonde_quat q = pose.rotation;
   pose.rotation = axis == 0 ? (sonde_quat){c * q.w - s * q.x, c * q.x + s * q.w, c * q.y + s * q.z,
@@ -205,6 +207,7 @@ static sonde_status open_solid(work *w, options *o, sonde_error *error) {
 }
 
 static sonde_status solve_depths(work *w, const options *o, sonde_error *error) {
+  assert(w->equilibrium != NULL && w->done == 0);
   const sonde_progress progress = app_progress();
   sonde_status status = SONDE_OK;
   for (uint32_t k = 0; k < o->depth_count && !status; ++k) {
@@ -228,6 +231,7 @@ static sonde_status solve_depths(work *w, const options *o, sonde_error *error) 
 }
 
 static sonde_status write_csv(const work *w, const options *o, sonde_error *error) {
+  assert(o->csv != NULL && w->done <= o->depth_count);
   sonde_file *file = NULL;
   sonde_status status = sonde_file_create(o->csv, &file, error);
   if (status) return status;
