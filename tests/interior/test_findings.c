@@ -231,6 +231,44 @@ static void nonsense_is_refused(void **state) {
   destroy(&l);
 }
 
+// An update for the vessels alone leaves the areas of a whole one, under a press that folds tissue.
+static void vessels_alone_have_the_same_areas(void **state) {
+  (void)state;
+  enum { VESSELS = 5, MOST = VESSELS * SONDE_SECTIONS };
+  static double area[MOST], outside[MOST];
+  static sonde_vec3 middle[MOST];
+  double apart = 0; // of the middles: what the repair of folded tissue moves them by
+  limb l;
+  create(&l);
+  for (sonde_interior_method m = SONDE_INTERIOR_SOLID; m <= SONDE_INTERIOR_COLUMNS; ++m) {
+    uint32_t closed = 0;
+    sonde_interior_set_method(l.in, m);
+    for (int alone = 0; alone < 2; ++alone) {
+      sonde_interior_for_vessels(l.in, alone);
+      for (int twice = 0; twice < 2; ++twice) press(&l, 12, 34e-3); // an area rounds with its last
+      assert_int_equal(sonde_interior_used_method(l.in), m);
+      for (int which = 0, at = 0; which < VESSELS; ++which) {
+        uint32_t count;
+        const sonde_vessel_state *v = sonde_interior_vessel(l.in, which, &count);
+        for (uint32_t i = 0; i < count; ++i, ++at) {
+          assert_true(at < MOST);
+          if (!alone) {
+            area[at] = v[i].area_ratio, outside[at] = v[i].outside_pa, middle[at] = v[i].centre_m;
+            closed += v[i].area_ratio < 0.1;
+            continue;
+          }
+          assert_true(v[i].area_ratio == area[at] && v[i].outside_pa == outside[at]);
+          apart = fmax(apart, v_distance(v[i].centre_m, middle[at]));
+        }
+      }
+    }
+    assert_true(closed > 0);
+  }
+  print_message("middles at most %.2f mm apart\n", 1e3 * apart);
+  assert_true(apart > 0 && apart < 4e-3);
+  destroy(&l);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(branches_are_vessels),
@@ -238,6 +276,7 @@ int main(void) {
       cmocka_unit_test(clot_in_one_vein_leaves_the_other),
       cmocka_unit_test(each_wall_is_exact),
       cmocka_unit_test(lesions_lie_in_the_tissue),
+      cmocka_unit_test(vessels_alone_have_the_same_areas),
       cmocka_unit_test(nonsense_is_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

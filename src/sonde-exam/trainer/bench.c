@@ -2,6 +2,7 @@
 #include "trainer/bench.h"
 
 #include "exam/vessels.h"
+#include "interior/interior.h"
 
 // A force beyond this is no hand's: the inside is not asked then. A lighter touch than the other
 // does not move it.
@@ -17,6 +18,7 @@ sonde_status sonde_bench_open(sonde_bench *bench, const sonde_case_setup *setup,
   if (!status) status = sonde_interior_create(setup->model, &bench->interior, error);
   if (!status) status = sonde_interior_set_findings(bench->interior, findings, error);
   if (!status && !solid) sonde_interior_set_method(bench->interior, SONDE_INTERIOR_COLUMNS);
+  if (!status) sonde_interior_for_vessels(bench->interior, true);
   return status;
 }
 

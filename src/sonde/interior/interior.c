@@ -61,6 +61,11 @@ void sonde_interior_set_method(sonde_interior *interior, sonde_interior_method m
   interior->method = method;
 }
 
+void sonde_interior_for_vessels(sonde_interior *interior, bool only) {
+  SONDE_ASSERT(interior != NULL);
+  interior->vessels_only = only;
+}
+
 sonde_interior_method sonde_interior_used_method(const sonde_interior *interior) {
   SONDE_ASSERT(interior != NULL);
   return interior->solid ? SONDE_INTERIOR_SOLID : SONDE_INTERIOR_COLUMNS;

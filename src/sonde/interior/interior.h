@@ -125,6 +125,7 @@ struct sonde_interior {
   uint32_t cache_count;        // 0 in a running session
   bool solid;                  // the last update was solved by the solid
   sonde_interior_method method;
+  bool vessels_only;     // of the updates: no tissue is read beside the vessels
   uint32_t vessel_count; // femoral vein, femoral artery, branches
   sonde_vessel_course course[SONDE_VESSELS];
   sonde_vessel_section *section[SONDE_VESSELS]; // [count], of the femoral vessels [SONDE_SECTIONS]
@@ -197,6 +198,10 @@ SONDE_LINK void sonde_interior_remember(const sonde_interior *interior,
 SONDE_LINK sonde_status sonde_interior_recall(sonde_interior *interior,
                                               const sonde_interior_memory *memory,
                                               sonde_error *error);
+// For the vessels alone, no picture follows: the following updates leave tissue folded that the
+// load folds, and let no wall shape the tissue beside it. Pressures and areas of all sections are
+// the same to the bit; their middles lack what the repair would have moved them. @thread owner
+SONDE_LINK void sonde_interior_for_vessels(sonde_interior *interior, bool only);
 // Room for factored windows that are not in use. @thread owner
 SONDE_LINK sonde_status sonde_interior_cache_windows(sonde_interior *interior, uint32_t count,
                                                      sonde_error *error);

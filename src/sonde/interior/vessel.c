@@ -1,6 +1,7 @@
 // Vessels under the probe: load on the skin -> stress at the vessel -> area -> ellipse -> tissue
 // around it (docs/interior_theory.md). Where a wall would fold the tissue it gives way.
 #include "base/base.h"
+#include "interior/fold_repair.h"
 #include "interior/vessels.h"
 #include "interior/window.h"
 
@@ -378,8 +379,11 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
   const sonde_vessel_course *course = in->course;
   for (uint32_t which = 0; which < in->vessel_count; ++which) update_vessel(in, which, &l, input);
   for (uint32_t which = 0; which < in->vessel_count; ++which)
-    for (uint32_t i = 0; i < course[which].count; ++i)
-      in->strained[which][i] = read_gradient(in, &in->state[which][i]);
+    for (uint32_t i = 0; i < course[which].count; ++i) {
+      sonde_vessel_state *v = &in->state[which][i];
+      if (in->vessels_only) v->coupling = 0; // no tissue follows the walls
+      in->strained[which][i] = read_gradient(in, v);
+    }
   for (uint32_t which = 0; which < in->vessel_count; ++which)
     for (uint32_t i = 0; i < course[which].count; ++i) {
       // Two vessels side by side leave tissue between them: towards the other a lumen takes a share
@@ -433,7 +437,10 @@ void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input
   in->solid = sonde_interior_follow(in, input);
   if (!in->solid) {
     sonde_interior_solve(in, input->positions_m);
-    sonde_column_grid_update(in->column_grid, in, input);
+    if (in->vessels_only)
+      in->column_grid->strength = 0;
+    else
+      sonde_column_grid_update(in->column_grid, in, input);
   }
   sonde_interior_vessels(in, input);
   in->tick = input->tick;

@@ -289,7 +289,7 @@ bool sonde_window_update(sonde_window *w, const sonde_interior *in,
   const bool pressed = solve_response(w, &c, along, &w->pressed);
   if (pressed && w->pressed.count > 0) fresh[count++] = w->pressed.x;
   sonde_numeric_recover(&w->solid.numeric, fresh, count); // all other nodes
-  if (moved) {
+  if (moved && !in->vessels_only) {
     // The linear solid's displacements, kept from folding.
     sonde_solid *s = &w->solid;
     for (uint32_t n = 0; n < SONDE_WINDOW_NODES; ++n)
