@@ -179,7 +179,7 @@ const GROUPS = {
       }
     },
   },
-  // Laws of 200 limbs: sums of faults, shares of limbs whose view is true and whose depth is at most 5 mm beyond its band.
+  // Laws of 200 limbs: sums of faults, shares of limbs whose view is true, and of those of BMI 20 to 35 whose depth is in its band and at most 5 mm beyond it.
   limb: {
     sources: ['src/sonde-limb', 'bench/bench_limb.c', 'bench/limb_laws.c'],
     measure(bin) {
@@ -191,8 +191,12 @@ const GROUPS = {
       const sum = all => all.reduce((a, b) => a + b, 0), mean = all => sum(all) / all.length
       const values = { limbs: rows.length, places: sum(column('places')) }
       for (const name of ['walls', 'bone', 'lumen', 'fascia', 'eye']) values[name] = sum(column(name))
-      for (let k = 1; k <= 11; ++k)
-        values[`v${k}`] = { true_percent: 100 * mean(column(`v${k}`)), in_band_percent: 100 * mean(column(`v${k}_off_mm`).map(off => Number(off <= 5))) }
+      const bmi = column('bmi'), known = all => all.filter((_, i) => bmi[i] >= 20 && bmi[i] <= 35)
+      for (let k = 1; k <= 11; ++k) {
+        const off = known(column(`v${k}_off_mm`))
+        values[`v${k}`] = { true_percent: 100 * mean(column(`v${k}`)), in_band_percent: 100 * mean(off.map(mm => Number(mm === 0))), near_band_percent: 100 * mean(off.map(mm => Number(mm <= 5))) }
+      }
+      values.banded = known(bmi).length
       const error = column('vein_error_mm')
       Object.assign(values, { vein_mean_mm: mean(error), vein_rms_mm: Math.sqrt(mean(error.map(e => e * e))) })
       for (const part of ['thigh', 'calf']) {
@@ -314,8 +318,8 @@ const BLOCKS = {
   limb_faults: ({ limb }) => table(['law', `violations in ${limb.limbs} limbs, ${fixed(limb.places, 0)} places`],
     [['walls of two vessels 0.3 mm apart or more', limb.walls], ['deep vessels 1.5 mm or more from bone', limb.bone], ['no lumen in bone', limb.lumen],
       ['deep vessels 0.3 mm or more under the deep fascia', limb.fascia], ['saphenous veins between both fasciae', limb.eye]]),
-  limb_views: ({ limb }) => table(['view', 'true, % of limbs', 'depth at most 5 mm beyond its band, %'],
-    Array.from({ length: 11 }, (_, k) => [`V${k + 1}`, fixed(limb[`v${k + 1}`].true_percent, 1), fixed(limb[`v${k + 1}`].in_band_percent, 1)])),
+  limb_views: ({ limb }) => table(['view', 'true, % of limbs', `depth in its band, % of the ${limb.banded} of BMI 20 to 35`, 'at most 5 mm beyond it'],
+    Array.from({ length: 11 }, (_, k) => [`V${k + 1}`, ...['true_percent', 'in_band_percent', 'near_band_percent'].map(key => fixed(limb[`v${k + 1}`][key], 1))])),
   solver: ({ solver }) => fenced(solver.output),
   accuracy: ({ accuracy }) => fenced(accuracy.output),
 }

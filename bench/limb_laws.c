@@ -1,4 +1,4 @@
-// Views of a limb from the labels of image planes: what is where in a picture 50 mm wide and 90 mm
+// Views of a limb from the labels of image planes: what is where in a picture 50 mm wide and 102 mm
 // deep, against the views' landmarks.
 #include "limb_laws.h"
 
@@ -9,7 +9,7 @@
 #include <string.h>
 
 static const double PIXEL_M = 0.0006;
-enum { WIDE = 84, DEEP = 150 };
+enum { WIDE = 84, DEEP = 170 };
 
 typedef struct picture {
   const sonde_limb *limb;
@@ -103,7 +103,7 @@ static const char *common_femoral(const picture *p, double *depth) {
   MUST(iliopsoas.pixels && iliopsoas.bottom > artery.bottom);
   MUST(pectineus.pixels && pectineus.bottom > vein.bottom);
   double head = bone_below(p, artery.x, artery.bottom) - artery.bottom;
-  MUST(head > 10 && head < 28); // 15 to 25 and half of a deviation of the depths
+  MUST(head >= 15 && head <= 25);
   MUST(isfinite(bone_below(p, vein.x + 8, vein.top)));
   return NULL;
 }
@@ -166,8 +166,10 @@ static const char *canal(const picture *p, double *depth) {
   MUST(v.y < a.y && p->medial * v.x < p->medial * a.x);
   seen sartorius = find_within(p, SONDE_LIMB_MUSCLE, "sartorius", artery.x - 12, artery.x + 12);
   MUST(sartorius.pixels && sartorius.top < artery.top);
-  double far = 1e3 * sonde_limb_distance(p->limb, v).bone;
-  MUST(far >= 10 && far <= 27);
+  seen femur = find(p, SONDE_LIMB_BONE, "femur");
+  MUST(femur.pixels);
+  double line = femur.top - vein.bottom;
+  MUST(line >= 15 && line <= 25);
   return NULL;
 }
 
@@ -183,8 +185,8 @@ static const char *popliteal(const picture *p, double *depth) {
        side = muscle(p, "semimembranosus"), other = muscle(p, "biceps");
   MUST((inner.pixels && inner.x > vein.x) || (side.pixels && side.x > vein.x));
   MUST((outer.pixels && outer.x < vein.x) || (other.pixels && other.x < vein.x));
-  double bone = bone_below(p, artery.x, artery.z) - artery.bottom;
-  MUST(bone > 2 && bone < 27);
+  double bone = bone_below(p, vein.x, vein.z) - vein.bottom;
+  MUST(bone >= 10 && bone <= 25);
   return NULL;
 }
 
@@ -209,6 +211,18 @@ static const char *trifurcation(const picture *p, double *depth) {
   *depth = main.pixels ? main.top : NAN;
   MUST(main.pixels && front.pixels);
   MUST(front.z > main.z);
+  // Further down the trunk has split into the posterior tibial and the peroneal veins.
+  static picture below;
+  bool split = false;
+  for (double down = 0.01; down < 0.065 && !split; down += 0.01) {
+    below = (picture){.limb = p->limb, .medial = p->medial};
+    sonde_pose probe = p->probe;
+    probe.position.z -= down;
+    take(&below, probe);
+    split =
+        vessel(&below, "posterior tibial vein").pixels && vessel(&below, "peroneal vein").pixels;
+  }
+  MUST(split);
   return NULL;
 }
 
@@ -240,17 +254,17 @@ static const char *muscle_veins(const picture *p, double *depth) {
 }
 
 // A view: its station; how far below it the probe may slide and how far it stands to the medial
-// side or to the back, mm; the band of its depth at a body mass index of 22.5 and of 32.5.
+// side or to the back, mm; the bands of its depth at a body mass index of 20 to 25 and of 30 to 35.
 static const struct {
   const char *station;
   const char *(*law)(const picture *p, double *depth);
   double from_mm, to_mm, aside_mm, band[2][2];
 } VIEWS[LIMB_VIEWS] = {{"common femoral vein", common_femoral, -8, 8, -6, {{15, 24}, {26, 40}}},
-                       {"saphenofemoral junction", junction, -8, 8, 0, {{8, 15}, {20, 27}}},
+                       {"saphenofemoral junction", junction, -8, 8, 0, {{8, 15}, {19, 31}}},
                        {"saphenofemoral junction", arterial_fork, 5, 20, -18, {{14, 22}, {24, 38}}},
                        {"deep femoral confluence", confluence, 0, 26, 0, {{18, 26}, {28, 42}}},
                        {"femoral vein, middle", middle, -8, 8, 0, {{25, 38}, {40, 60}}},
-                       {"adductor canal", canal, -8, 8, 0, {{30, 45}, {45, 70}}},
+                       {"adductor canal", canal, -8, 8, -8, {{30, 45}, {45, 70}}},
                        {"popliteal vein", popliteal, -8, 24, 0, {{15, 25}, {23, 40}}},
                        {"small saphenous vein", small_saphenous, -8, 8, 0, {{5, 12}, {8, 20}}},
                        {"trifurcation", trifurcation, -8, 8, 0, {{20, 35}, {28, 50}}},
@@ -294,13 +308,15 @@ void limb_views(const sonde_limb *limb, limb_view view[LIMB_VIEWS]) {
   picture p = {.limb = limb};
   double bmi = sonde_limb_body_of(limb)->bmi;
   p.medial = sonde_limb_body_of(limb)->side == SONDE_LIMB_LEFT ? -1 : 1;
+  // 0 from a body mass index of 20 to 25, 1 from 30 to 35, linear between; a tenth per unit beyond.
+  double heavier = clamp((bmi - 25) / 5, 0, 1) + 0.1 * (fmin(bmi - 20, 0) + fmax(bmi - 35, 0));
   for (uint32_t k = 0; k < LIMB_VIEWS; ++k) {
     const sonde_limb_station *s = stations;
     while (strcmp(s->name, VIEWS[k].station) != 0) ++s;
     view[k] = (limb_view){"no plane", NAN, {0, 0}};
     for (int i = 0; i < 2; ++i)
       view[k].band_mm[i] =
-          VIEWS[k].band[0][i] + 0.1 * (bmi - 22.5) * (VIEWS[k].band[1][i] - VIEWS[k].band[0][i]);
+          VIEWS[k].band[0][i] + heavier * (VIEWS[k].band[1][i] - VIEWS[k].band[0][i]);
     // From the middle of the slide outwards, without tilt first.
     double centre = 0.5 * (VIEWS[k].from_mm + VIEWS[k].to_mm);
     double reach = 0.5 * (VIEWS[k].to_mm - VIEWS[k].from_mm);

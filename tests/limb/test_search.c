@@ -230,10 +230,10 @@ static bool search(hand *h, uint32_t station, double eye) {
     if (!centre(h, THIGH, 48) || !slide(h, 0.65, THIGH, membrane)) return false;
     h->level += 30 * mm;
     return centre(h, THIGH, 24) && see(h, "vastus medialis");
-  case 7: // down to where the femoral vein goes through the hiatus, and two fingers back
+  case 7: // down to where the femoral vein goes through the hiatus, and three fingers back
     h->level = 0.55, h->angle = 75 * DEGREE;
     if (!centre(h, THIGH, 48) || !slide(h, 0.85, THIGH, hiatus)) return false;
-    h->level -= 25 * mm;
+    h->level -= 45 * mm;
     return centre(h, THIGH, 24) != NULL;
   case 8: // down from above the crease until the heads stand on either side
     h->level = 0.93, h->angle = 180 * DEGREE;

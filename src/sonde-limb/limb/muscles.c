@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const double LEAST_AREA = 14e-6; // a belly of less is a tendon
-static const double MOST_SCALE = 1.4;   // muscle against its rule; fat takes what is left
+static const double MOST_SCALE = 1.25;  // muscle against its rule; fat takes what is left
 
 // Fat between the muscles: which share of the section it takes at levels, and where.
 typedef struct filler {

@@ -120,7 +120,7 @@ static const double HARMONICS[][5] = {
 // Where the section's centre is, as the place (degrees, f) of a bone in it: the hip's centre up to
 // level 0, the femoral shaft down to 1, the tibia below.
 static const double CENTRES[][3] = {
-    {-0.2, 15, 0.26},  {0, 18, 0.24},    {0.15, 272, 0.46}, {0.25, 274, 0.4}, {0.5, 299, 0.2},
+    {-0.2, 15, 0.14},  {0, 18, 0.105},   {0.15, 272, 0.46}, {0.25, 274, 0.4}, {0.5, 299, 0.2},
     {0.75, 317, 0.21}, {0.9, 345, 0.12}, {0.99, 5, 0.02},   {1.01, 15, 0.05}, {1.12, 22, 0.46},
     {1.25, 24, 0.73},  {1.5, 28, 0.75},  {1.75, 25, 0.52},  {1.9, 30, 0.34},  {2, 22, 0.25}};
 
@@ -154,7 +154,7 @@ static double fat_at(const sonde_limb_body *b, double level, double angle) {
       {0.75, log(0.9 * front), log(0.95 * medial), log(0.9 * lateral), log(0.9 * back)},
       {0.93, log(0.5 * front), log(0.75 * medial), log(0.7 * lateral), log(fold)},
       {1, log(0.0035), log(0.65 * medial), log(0.6 * lateral), log(b->fat_popliteal_m)},
-      {1.1, log(1.2 * shin), log(0.9 * inner), log(outer), log(b->fat_popliteal_m)},
+      {1.1, log(1.2 * shin), log(0.9 * inner), log(outer), log(sqrt(b->fat_popliteal_m * calf))},
       {1.25, log(shin), log(inner), log(outer), log(calf)},
       {1.5, log(0.95 * shin), log(0.8 * inner), log(0.85 * outer), log(0.8 * calf)},
       {1.75, log(0.9 * shin), log(0.55 * inner), log(0.5 * outer), log(0.55 * calf)},

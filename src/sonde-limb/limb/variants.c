@@ -40,6 +40,11 @@ static double diameter(bool female, vessel_diameter which, double z) {
   return fmax(mean + DIAMETER[which].deviation * z, mean / 3);
 }
 
+double limb_murray_rest(double whole, double branch) {
+  const double exponent = 2.6;
+  return pow(fmax(pow(whole, exponent) - pow(branch, exponent), 0), 1 / exponent);
+}
+
 // Calibres: arteries and veins have a common share each; segments of one line share their number,
 // so that a line does not widen downwards but where its table does.
 static void draw_calibres(bool female, uint64_t seed, double *radius) {
@@ -65,6 +70,12 @@ static void draw_calibres(bool female, uint64_t seed, double *radius) {
   }
   mm[DIA_EIV] =
       fmax(diameter(female, DIA_EIV, (female ? 1.2 * z - 0.1 : 1.5 * z - 0.8)), mm[DIA_CFV]);
+  // The veins that join to it go with it.
+  const vessel_diameter joined[] = {DIA_FV, DIA_DFV};
+  const double wide = (mm[DIA_CFV] - diameter(female, DIA_CFV, 0)) / DIAMETER[DIA_CFV].deviation;
+  for (size_t k = 0; k < SONDE_COUNT_OF(joined); ++k)
+    mm[joined[k]] = diameter(female, joined[k],
+                             0.6 * wide + 0.8 * limb_draw_normal(seed, DRAW_CALIBRES + joined[k]));
   // Tributaries are narrower than what they join.
   const struct {
     vessel_diameter narrow, wide;
@@ -88,6 +99,10 @@ static void draw_calibres(bool female, uint64_t seed, double *radius) {
                {DIA_PERA, DIA_TPA, 0.9}};
   for (size_t k = 0; k < SONDE_COUNT_OF(order); ++k)
     mm[order[k].narrow] = fmin(mm[order[k].narrow], order[k].most * mm[order[k].wide]);
+  // Both together are no wider than Murray's law with an exponent of 2.8 allows below the junction.
+  const double room = limb_murray_rest(mm[DIA_CFV], mm[DIA_GSV_ARCH]), most = 2.8;
+  const double share = room / pow(pow(mm[DIA_FV], most) + pow(mm[DIA_DFV], most), 1 / most);
+  for (size_t k = 0; k < SONDE_COUNT_OF(joined); ++k) mm[joined[k]] *= fmin(share, 1);
   for (uint32_t k = 0; k < DIA_COUNT; ++k) radius[k] = 0.5e-3 * mm[k];
 }
 

@@ -73,6 +73,8 @@ typedef struct vessel_draws {
 
 double limb_draw_normal(uint64_t seed, uint32_t what); // within 2.4 deviations
 double limb_draw_uniform(uint64_t seed, uint32_t what);
+// Width that is left of a vein's when it has taken a branch, by Murray's law.
+double limb_murray_rest(double whole, double branch);
 vessel_draws limb_vessel_draws(const sonde_limb *limb);
 
 // ---- the graph ----------------------------------------------------------------------------------
@@ -201,8 +203,10 @@ void limb_vessels_lay_muscle_veins(struct limb_vessels *v);
 void limb_vessels_lay_perforators(struct limb_vessels *v);
 void limb_nerves_lay(struct limb_vessels *v);
 void limb_lymph_lay(struct limb_vessels *v);
-// Moves centre lines apart and away from bones and fascia; counts what is left in faults.
-sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_error *error);
+// Moves centre lines apart and away from bones and fascia, with `close` also companion veins to
+// their arteries; counts what is left in faults.
+sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool close,
+                                sonde_error *error);
 sonde_status limb_vessels_count_faults(struct limb_vessels *v, sonde_error *error);
 sonde_status limb_vessels_index(struct limb_vessels *v, sonde_error *error);
 // Nearest branch: signed distance to the lumen, its place; joints smoothed.

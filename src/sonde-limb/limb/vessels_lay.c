@@ -58,22 +58,30 @@ static uint32_t main_artery(const struct limb_vessels *v, sonde_vec3 *knot) {
   const vessel_draws *d = &v->draws;
   const double mm = 1e-3 * limb->scale, r = d->radius[DIA_CFA] + ARTERY_WALL;
   // Depth of the centre below the fascia; a wide vein beside the artery needs as much.
-  double cover = fmax(fmax(d->artery_cover, 0.0025) + r, d->radius[DIA_CFV] + 0.0055);
+  double cover = fmax(d->artery_cover, 0.0025) + r, head = 0;
+  // Iliopsoas between artery and femoral head is 16 to 23 mm thick (view V1).
+  for (; head < 0.08; head += 0.0005) {
+    sonde_vec3 p = groin_point(limb, 15.5 * mm, 5 * mm, head);
+    const double at[3] = {p.x, p.y, p.z};
+    if (limb_bone_distance(limb, at, NULL) < 0) break;
+  }
+  cover = clamp(cover, head - r - 0.023, head - r - 0.016);
+  cover = fmax(cover, d->radius[DIA_CFV] + 0.0055);
   uint32_t n = 0;
   knot[n++] = groin_point(limb, 6 * mm, 86 * mm, cover + 26 * mm);
   knot[n++] = groin_point(limb, 10 * mm, 48 * mm, cover + 9 * mm);
   knot[n++] = groin_point(limb, 14 * mm, 22 * mm, cover);
   knot[n++] = groin_point(limb, 17 * mm, -8 * mm, cover);
-  knot[n++] = groin_point(limb, 19 * mm, d->bifurcation_z, cover + 1 * mm);
-  const double femoral[][3] = {{0.15, 21, 0.79},   {0.25, 36, 0.71},    {0.35, 48, 0.69},
-                               {0.45, 60, 0.67},   {0.52, 70, 0.67},    {0.58, 83, 0.031},
-                               {0.66, 104, 0.024}, {0.72, 135, 0.0145}, {0.80, 165, 0.42},
-                               {0.90, 180, 0.50},  {1.0, 186, 0.52},    {1.08, 182, 0.42},
-                               {1.13, 172, 0.36},  {1.17, 155, 0.31},   {1.22, 135, 0.28}};
+  knot[n++] = groin_point(limb, 19 * mm, d->bifurcation_z, cover + 2 * mm);
+  const double femoral[][3] = {
+      {0.15, 21, 0.81},    {0.25, 36, 0.71},  {0.35, 48, 0.69},  {0.45, 60, 0.67},
+      {0.52, 70, 0.67},    {0.58, 83, 0.034}, {0.62, 93, 0.032}, {0.66, 106, 0.0265},
+      {0.72, 135, 0.0145}, {0.80, 165, 0.42}, {0.90, 180, 0.50}, {1.0, 186, 0.52},
+      {1.08, 182, 0.42},   {1.13, 172, 0.36}, {1.17, 155, 0.31}, {1.22, 135, 0.28}};
   double shift = d->hiatus - 0.72, turn = 3 * d->wander[0];
   for (size_t k = 0; k < SONDE_COUNT_OF(femoral); ++k) {
     double level = femoral[k][0], near = fmax(0, 1 - fabs(level - 0.68) / 0.2);
-    if (level > d->trunk_end - 0.012 && k > 12) continue;
+    if (level > d->trunk_end - 0.012 && k > 13) continue;
     double degrees = femoral[k][1] + turn * (level < 1 ? 1 : 0.3);
     level += shift * near;
     // In the canal the third number is the distance from the femur, m; elsewhere a fraction.
@@ -305,9 +313,17 @@ void limb_vessels_lay_veins(struct limb_vessels *v) {
   const double room = fmax(0.5 * (least - others), 0.0018);
   r[DIA_POPV] = fmin(r[DIA_POPV], room), r[DIA_TPV] = fmin(r[DIA_TPV], 0.95 * r[DIA_POPV]);
   double hiatus = limb_z(limb, d->hiatus), split = limb_z(limb, fmin(1.13, d->trunk_end - 0.004));
+  // Above the saphenofemoral junction the common femoral vein has its table's width. Below, and in
+  // the femoral vein's upper part above mid-thigh, of which the table speaks, widths follow from
+  // Murray's law, by which the lumina of a joint have r^k in balance.
+  const double below = limb_murray_rest(r[DIA_CFV], r[DIA_GSV_ARCH]);
+  const double upper = fmax(limb_murray_rest(below, r[DIA_DFV]), r[DIA_FV]);
   const radius_step step[] = {{1, r[DIA_EIV]},
                               {d->ligament_z, r[DIA_CFV]},
-                              {d->confluence_z, r[DIA_FV]},
+                              {d->junction_z - 0.004, below},
+                              {d->confluence_z, upper},
+                              {limb_z(limb, 0.25), 0.5 * (upper + r[DIA_FV])},
+                              {limb_z(limb, 0.4), r[DIA_FV]},
                               {hiatus, r[DIA_POPV]},
                               {split, r[DIA_TPV]}};
   const struct {

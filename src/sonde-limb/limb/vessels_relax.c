@@ -145,7 +145,7 @@ static bool crosses(const struct limb_vessels *v, uint32_t b, uint32_t k) {
   // A vein that joins a wider one of its own layer ends in the middle of that, not in its own.
   uint32_t free = !parent                          ? 0
                   : parent->layer == branch->layer ? 2
-                  : parent->layer == LAYER_DEEP    ? 14
+                  : parent->layer == LAYER_DEEP    ? 10
                                                    : 8;
   uint32_t end = branch->joins == VESSEL_NONE                      ? 0
                  : v->branch[branch->joins].layer == branch->layer ? 2
@@ -237,7 +237,8 @@ static void end(neighbours *n) {
   sonde_free(n->clear);
 }
 
-sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_error *error) {
+sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool close,
+                                sonde_error *error) {
   neighbours n;
   sonde_vec3 *step = SONDE_NEW(sonde_vec3, 2 * v->places);
   bool made = begin(&n, v) && step;
@@ -247,7 +248,7 @@ sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, sonde_e
     for (uint32_t i = 0; i < v->places; ++i) step[i] = vec3(0, 0, 0);
     for_pairs(&n, push_pair, &s);
     push_out(&n, step);
-    pull_mates(&n, &s);
+    if (close) pull_mates(&n, &s);
     // Each branch spreads the steps along itself; its own bends lose a little.
     sonde_vec3 *spare = step + v->places;
     for (uint32_t b = 0; b < v->branches; ++b) {

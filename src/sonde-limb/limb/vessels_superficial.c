@@ -80,16 +80,16 @@ uint32_t limb_vessels_lay_great(struct limb_vessels *v) {
   double junction = limb_level(limb, d->junction_z), radius = d->radius[DIA_GSV];
   double aside = d->variants.great_saphenous == SONDE_LIMB_GSV_LATERAL ? -22 : 2.5 * d->wander[1];
   sonde_vec3 knot[80];
-  // The arch: forward and medially out of the common femoral vein, through the fascia, down.
+  // The arch: forward and medially out of the common femoral vein, in the plane of the junction
+  // until it lies in front of that vein; then through the fascia and down.
   uint32_t at = limb_branch_at_level(v, common, junction);
   sonde_vec3 joint = limb_branch_point(v, common, at);
-  double level, degrees, f;
+  double level, degrees, f, rise = d->radius[DIA_CFV] + 1.15 * d->radius[DIA_GSV_ARCH];
   limb_place_of(limb, joint, &level, &degrees, &f);
-  double deep = (1 - f) * limb_fascia_radius(limb, level, degrees * DEGREE);
   knot[n++] = joint;
-  knot[n++] = limb_below_fascia(limb, level + 0.012, degrees + 3, 0.45 * deep);
-  knot[n++] = in_eye(limb, level + 0.04, degrees + 5, radius);
-  double begin = level + 0.09;
+  knot[n++] = v_madd(joint, rise, vec3(sin(30 * DEGREE), cos(30 * DEGREE), -0.2));
+  knot[n++] = in_eye(limb, level + 0.03, degrees + 5, radius);
+  double begin = level + 0.07;
   for (double l = begin; l < 1.99 && n < SONDE_COUNT_OF(knot); l += 0.028) {
     double w = clamp((l - begin) / 0.25, 0, 1);
     double towards = saphenous_angle(l, aside), start = degrees + 6;
