@@ -101,7 +101,7 @@ static const station_row STATIONS[] = {
      "Vein and artery go deep towards the femur and leave through the hiatus; a hand behind the "
      "thigh helps the compression.",
      SONDE_LIMB_SUPINE_TURNED,
-     0.61,
+     0.62,
      0,
      80,
      {"femoral vein"}},
