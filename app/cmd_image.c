@@ -16,7 +16,6 @@ typedef struct options {
   double numbers[7], size[2]; // of the pose as typed; pixels
   sonde_pose pose;
   bool posed, json;
-  double drawn_m[2]; // front to back of vein and artery, as the picture shows them
   long site, seed;
   double force_n, press_m, turn_rad, aperture_m, radius_m; // NaN when not asked for
   sonde_echo_settings settings;
@@ -171,37 +170,6 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
   return status;
 }
 
-// A scanner and the settings that the words change in it.
-static sonde_status choose_scanner(options *o, sonde_scanner *scanner, sonde_error *error) {
-  sonde_status status = scanner_choose(o->scanner, scanner, error);
-  const sonde_echo_range *ranges = sonde_echo_ranges();
-  for (size_t k = 0; k < sizeof SETTINGS / sizeof *SETTINGS && !status; ++k)
-    for (const sonde_echo_range *r = ranges; r < ranges + SONDE_ECHO_SETTINGS; ++r)
-      if (strcmp(r->key, SETTINGS[k].key) == 0 && !app_option_given(SETTINGS[k].name))
-        memcpy((char *)&o->settings + r->offset, (const char *)&scanner->settings + r->offset,
-               sizeof(double));
-  if (isnan(o->radius_m) && scanner->radius_m > 0) o->radius_m = scanner->radius_m;
-  if (isnan(o->aperture_m) && scanner->aperture_m > 0) o->aperture_m = scanner->aperture_m;
-  return status;
-}
-
-// Diameters as the picture shows them: tissue of another sound speed is drawn thicker or thinner.
-static void measure_drawn(options *o, const settled *s, const sonde_echo *echo) {
-  for (int which = 0; which < 2; ++which) {
-    sonde_vessel_state v;
-    if (!sonde_interior_vessel_at_plane(s->interior, which, s->pose, &v)) continue;
-    sonde_vec3 end[2];
-    for (int side = 0; side < 2; ++side) {
-      const double h = side ? v.half_short_m : -v.half_short_m;
-      end[side] = sonde_truth_drawn(echo, (sonde_vec3){v.centre_m.x + h * v.flat_axis.x,
-                                                       v.centre_m.y + h * v.flat_axis.y,
-                                                       v.centre_m.z + h * v.flat_axis.z});
-    }
-    const double x = end[1].x - end[0].x, y = end[1].y - end[0].y, z = end[1].z - end[0].z;
-    o->drawn_m[which] = sqrt(x * x + y * y + z * z);
-  }
-}
-
 // What a run makes, and what it is made of.
 typedef struct drawing {
   settled s;
@@ -211,54 +179,33 @@ typedef struct drawing {
   double aperture_m;
 } drawing;
 
-// Presses, draws and writes the picture and its truth.
-static sonde_status draw(options *o, drawing *d, sonde_error *error) {
-  sonde_scanner scanner;
-  sonde_status status = choose_scanner(o, &scanner, error);
-  if (!status) status = sonde_pathology_preset(o->pathology, &d->pathology, error);
-  if (!status) status = settled_open(&d->s, o->model, o->probe, NULL, true, error);
-  if (!status) status = place(&d->s, o, error);
-  if (status) return status;
-  sonde_echo_def def = sonde_echo_def_default();
-  def.seed = (uint64_t)o->seed;
-  def.scanner = &scanner;
-  const double radius = isnan(o->radius_m) ? 0 : o->radius_m;
-  d->aperture_m = isnan(o->aperture_m) ? 2 * d->s.probe.half_x_m : o->aperture_m;
-  settled_update(&d->s, &d->pathology, 0, sonde_state_tick(d->s.state));
-  status = sonde_echo_check_view(d->aperture_m, radius, error);
-  if (!status && o->strain && radius > 0)
-    status =
-        app_error(error, SONDE_ARGUMENT,
-                  "--strain expects a flat face, this one has a radius of %g mm", 1e3 * radius);
-  if (!status) status = sonde_echo_create(d->s.interior, &def, &d->echo, error);
-  if (!status) status = sonde_echo_set_radius(d->echo, radius, error);
-  if (!status)
-    status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &d->image, error);
-  if (status) return status;
-  sonde_echo_render(d->echo, d->s.pose, d->aperture_m, &d->pathology, &o->settings, &d->image);
-  const uint32_t lost = sonde_echo_last_times(d->echo).lost;
-  if (lost) fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
-  status = sonde_image_save_png(&d->image, o->out, error);
-  measure_drawn(o, &d->s, d->echo);
-  if (!status && o->truth)
-    status = image_truth_write(o->truth, d->echo, d->s.interior, &d->image, error);
-  return status;
-}
-
 // What the picture shows; the strain last, for which the probe goes on.
 static sonde_status report(options *o, drawing *d, sonde_error *error) {
-  sonde_vessel_state vein, artery;
-  const bool v = sonde_interior_vessel_at_plane(d->s.interior, 0, d->s.pose, &vein);
-  const bool a = sonde_interior_vessel_at_plane(d->s.interior, 1, d->s.pose, &artery);
+  sonde_vessel_state vessel[2];
+  bool there[2];
+  // Diameters, and as the picture draws them: tissue of another sound speed is thicker or thinner.
+  double across_m[2] = {NAN, NAN}, drawn_m[2] = {NAN, NAN}, area[2] = {NAN, NAN};
+  for (int which = 0; which < 2; ++which) {
+    const sonde_vessel_state *v = &vessel[which];
+    there[which] = sonde_interior_vessel_at_plane(d->s.interior, which, d->s.pose, &vessel[which]);
+    if (!there[which]) continue;
+    const double h = v->half_short_m;
+    const sonde_vec3 c = v->centre_m, n = v->flat_axis;
+    const sonde_vec3 p = sonde_truth_drawn(
+                         d->echo, (sonde_vec3){c.x + h * n.x, c.y + h * n.y, c.z + h * n.z}),
+                     q = sonde_truth_drawn(
+                         d->echo, (sonde_vec3){c.x - h * n.x, c.y - h * n.y, c.z - h * n.z});
+    drawn_m[which] =
+        sqrt((p.x - q.x) * (p.x - q.x) + (p.y - q.y) * (p.y - q.y) + (p.z - q.z) * (p.z - q.z));
+    across_m[which] = 2 * h, area[which] = v->area_ratio;
+  }
   if (!o->json) {
     printf("%s: %.0f x %.0f pixels, %.1f x %.1f mm, %.2f N\n", o->out, o->size[0], o->size[1],
            d->image.width_m * 1e3, d->image.height_m * 1e3, d->s.force_n);
-    if (v)
-      printf("vein   %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * vein.half_short_m,
-             100 * vein.area_ratio);
-    if (a)
-      printf("artery %.1f mm front to back, %.0f %% of its rest area\n", 2e3 * artery.half_short_m,
-             100 * artery.area_ratio);
+    for (int which = 0; which < 2; ++which)
+      if (there[which])
+        printf("%-6s %.1f mm front to back, %.0f %% of its rest area\n", which ? "artery" : "vein",
+               1e3 * across_m[which], 100 * area[which]);
     settled_branches(&d->s, false);
   } else {
     app_json_begin();
@@ -266,10 +213,8 @@ static sonde_status report(options *o, drawing *d, sonde_error *error) {
              d->image.height_m * 1e3, d->s.force_n);
     settled_json_jumps(&d->s);
     app_json("case:%s vein_short_mm:%g vein_area_ratio:%g artery_short_mm:%g artery_area_ratio:%g",
-             o->pathology, v ? 2e3 * vein.half_short_m : NAN, v ? vein.area_ratio : NAN,
-             a ? 2e3 * artery.half_short_m : NAN, a ? artery.area_ratio : NAN);
-    app_json("vein_drawn_mm:%g artery_drawn_mm:%g", v ? 1e3 * o->drawn_m[0] : NAN,
-             a ? 1e3 * o->drawn_m[1] : NAN);
+             o->pathology, 1e3 * across_m[0], area[0], 1e3 * across_m[1], area[1]);
+    app_json("vein_drawn_mm:%g artery_drawn_mm:%g", 1e3 * drawn_m[0], 1e3 * drawn_m[1]);
     settled_branches(&d->s, true);
   }
   image_strain strain = {.echo = d->echo,
@@ -295,7 +240,44 @@ static int run(void *from) {
   drawing d = {0};
   sonde_error error = {0};
   app_progress_begin("pressing and drawing");
-  sonde_status status = draw(o, &d, &error);
+  // A scanner and the settings that the words change in it.
+  sonde_scanner scanner;
+  sonde_status status = scanner_choose(o->scanner, &scanner, &error);
+  const sonde_echo_range *ranges = sonde_echo_ranges();
+  for (size_t k = 0; k < sizeof SETTINGS / sizeof *SETTINGS && !status; ++k)
+    for (const sonde_echo_range *r = ranges; r < ranges + SONDE_ECHO_SETTINGS; ++r)
+      if (strcmp(r->key, SETTINGS[k].key) == 0 && !app_option_given(SETTINGS[k].name))
+        memcpy((char *)&o->settings + r->offset, (const char *)&scanner.settings + r->offset,
+               sizeof(double));
+  if (isnan(o->radius_m) && scanner.radius_m > 0) o->radius_m = scanner.radius_m;
+  if (isnan(o->aperture_m) && scanner.aperture_m > 0) o->aperture_m = scanner.aperture_m;
+  if (!status) status = sonde_pathology_preset(o->pathology, &d.pathology, &error);
+  if (!status) status = settled_open(&d.s, o->model, o->probe, NULL, true, &error);
+  if (!status) status = place(&d.s, o, &error);
+  sonde_echo_def def = sonde_echo_def_default();
+  def.seed = (uint64_t)o->seed;
+  def.scanner = &scanner;
+  const double radius = isnan(o->radius_m) ? 0 : o->radius_m;
+  d.aperture_m = isnan(o->aperture_m) ? 2 * d.s.probe.half_x_m : o->aperture_m;
+  if (!status) settled_update(&d.s, &d.pathology, 0, sonde_state_tick(d.s.state));
+  if (!status) status = sonde_echo_check_view(d.aperture_m, radius, &error);
+  if (!status && o->strain && radius > 0)
+    status =
+        app_error(&error, SONDE_ARGUMENT,
+                  "--strain expects a flat face, this one has a radius of %g mm", 1e3 * radius);
+  if (!status) status = sonde_echo_create(d.s.interior, &def, &d.echo, &error);
+  if (!status) status = sonde_echo_set_radius(d.echo, radius, &error);
+  if (!status)
+    status = sonde_image_create((uint32_t)o->size[0], (uint32_t)o->size[1], &d.image, &error);
+  if (!status) {
+    sonde_echo_render(d.echo, d.s.pose, d.aperture_m, &d.pathology, &o->settings, &d.image);
+    const uint32_t lost = sonde_echo_last_times(d.echo).lost;
+    if (lost)
+      fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
+    status = sonde_image_save_png(&d.image, o->out, &error);
+  }
+  if (!status && o->truth)
+    status = image_truth_write(o->truth, d.echo, d.s.interior, &d.image, &error);
   app_progress_end();
   if (!status) status = report(o, &d, &error);
   sonde_echo_destroy(d.echo);

@@ -13,14 +13,6 @@
 static const double further_m = 0.5e-3, residual = 1e-6;
 static const float alike = 0.8f; // correlation at which speckle counts as found again
 
-// The picture's lines and depths as pixels, which the truth takes.
-static sonde_image grid_of(const image_strain *s, uint32_t lines) {
-  const double pitch = s->aperture_m / (lines - 1);
-  const uint32_t rows = (uint32_t)(s->settings->depth_m / pitch);
-  return (sonde_image){
-      .width = lines, .height = rows, .width_m = lines * pitch, .height_m = rows * pitch};
-}
-
 // How much deeper each pixel of the grid is drawn now, m, for tissue that was there before.
 static void find_moves(const image_strain *s, const settled *at, sonde_pose before,
                        const sonde_truth *truth, float *moved) {
@@ -39,30 +31,6 @@ static void find_moves(const image_strain *s, const settled *at, sonde_pose befo
     const double was = top + ((double)(i / truth->width) + 0.5) * pitch;
     moved[i] = (float)(sonde_truth_drawn(s->echo, now).z - was);
   }
-}
-
-// The true displacement at the tracked places, and the label there.
-static void sample_truth(const image_strain *s, const sonde_truth *truth, const float *moved,
-                         const sonde_strain *tracked, float *out, uint8_t *label) {
-  const double pitch = truth->width_m / truth->width;
-  const double top = s->settings->depth_m - truth->height_m;
-  assert(tracked->lines == truth->width && truth->height >= 2);
-  for (uint32_t r = 0; r < tracked->rows; ++r) {
-    const double row = (tracked->first_m + r * tracked->hop_m - top) / pitch - 0.5;
-    const double low = fmin(fmax(floor(row), 0), truth->height - 2), t = row - low;
-    for (uint32_t l = 0; l < tracked->lines; ++l) {
-      const size_t i = (size_t)low * truth->width + l;
-      out[(size_t)r * tracked->lines + l] =
-          moved[i] + (float)t * (moved[i + truth->width] - moved[i]);
-      label[(size_t)r * tracked->lines + l] = truth->tissue[i + (t > 0.5 ? truth->width : 0)];
-    }
-  }
-}
-
-static bool is_tissue(uint8_t label) {
-  return label == SONDE_LABEL_SKIN || label == SONDE_LABEL_FAT || label == SONDE_LABEL_MUSCLE ||
-         label == SONDE_LABEL_FASCIA || label == SONDE_LABEL_TENDON || label == SONDE_LABEL_NERVE ||
-         label == SONDE_LABEL_NODE || label == SONDE_LABEL_THROMBUS;
 }
 
 // From blue (stiff) over green to red (twice the mean strain and more); black: not known.
@@ -119,14 +87,31 @@ static sonde_status write_table(const char *path, const image_strain *s,
   return sonde_file_commit(file, error);
 }
 
-// Means over what is tissue and was found again.
-static void compare(image_strain *s, const sonde_strain *tracked, const float *slope,
-                    const uint8_t *label, bool *known) {
+// The true displacement at the tracked places, its slope and the label there; means over what is
+// tissue and was found again.
+static void compare(image_strain *s, const sonde_truth *truth, const float *moves,
+                    const sonde_strain *tracked, float *moved, float *slope, uint8_t *label,
+                    bool *known) {
+  static const bool IS_TISSUE[SONDE_LABEL_COUNT] = {
+      [SONDE_LABEL_SKIN] = true,   [SONDE_LABEL_FAT] = true,     [SONDE_LABEL_MUSCLE] = true,
+      [SONDE_LABEL_FASCIA] = true, [SONDE_LABEL_NODE] = true,    [SONDE_LABEL_TENDON] = true,
+      [SONDE_LABEL_NERVE] = true,  [SONDE_LABEL_THROMBUS] = true};
+  const double pitch = truth->width_m / truth->width;
+  const double top = s->settings->depth_m - truth->height_m;
+  assert(tracked->lines == truth->width && truth->height >= 2);
+  for (size_t i = 0; i < (size_t)tracked->rows * tracked->lines; ++i) {
+    const size_t row = i / tracked->lines, line = i % tracked->lines;
+    const double at = (tracked->first_m + (double)row * tracked->hop_m - top) / pitch - 0.5;
+    const double low = fmin(fmax(floor(at), 0), truth->height - 2), t = at - low;
+    const size_t from = (size_t)low * truth->width + line;
+    moved[i] = moves[from] + (float)t * (moves[from + truth->width] - moves[from]);
+    label[i] = truth->tissue[from + (t > 0.5 ? truth->width : 0)];
+  }
+  sonde_strain_slopes(tracked, moved, tracked->likeness, slope);
   double n = 0, sum = 0, square = 0, all = 0;
   for (size_t i = 0; i < (size_t)tracked->rows * tracked->lines; ++i) {
-    known[i] = is_tissue(label[i]);
-    all += known[i];
-    known[i] = known[i] && tracked->likeness[i] > alike;
+    known[i] = IS_TISSUE[label[i]] && tracked->likeness[i] > alike;
+    all += IS_TISSUE[label[i]];
     if (!known[i]) continue;
     const double off = (double)tracked->strain[i] - (double)slope[i];
     n += 1, sum += (double)slope[i], square += off * off;
@@ -141,7 +126,12 @@ sonde_status image_strain_write(const char *folder, settled *s, image_strain *st
   uint32_t lines, samples;
   const float *envelope = sonde_echo_envelope(strain->echo, &lines, &samples);
   float *before = malloc((size_t)lines * samples * sizeof *before);
-  sonde_image grid = grid_of(strain, lines), after = {0};
+  const double pitch = strain->aperture_m / (lines - 1);
+  // The picture's lines and depths as pixels, which the truth takes.
+  const uint32_t down = (uint32_t)(strain->settings->depth_m / pitch);
+  const sonde_image grid = {
+      .width = lines, .height = down, .width_m = lines * pitch, .height_m = down * pitch};
+  sonde_image after = {0};
   const size_t pixels = (size_t)grid.width * grid.height;
   float *moves = malloc(pixels * sizeof *moves);
   sonde_truth truth = {0};
@@ -173,9 +163,7 @@ sonde_status image_strain_write(const char *folder, settled *s, image_strain *st
     status = app_error(error, SONDE_MEMORY, "no memory for strain");
   if (!status) {
     char path[4096];
-    sample_truth(strain, &truth, moves, &tracked, moved, label);
-    sonde_strain_slopes(&tracked, moved, tracked.likeness, slope);
-    compare(strain, &tracked, slope, label, known);
+    compare(strain, &truth, moves, &tracked, moved, slope, label, known);
     status = sonde_directory_make(folder, 0777, true, error);
     for (int which = 0; which < 2 && !status; ++which) {
       snprintf(path, sizeof path, "%s/%s", folder, which ? "strain_true.png" : "strain.png");

@@ -5,40 +5,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { MOST_VESSELS_NAMED = 255 };
-
 // Colours of the tissues, in the order of sonde_label.
 static const uint8_t TISSUE[SONDE_LABEL_COUNT][3] = {
     {0, 0, 0},       {255, 205, 178}, {255, 230, 128}, {178, 76, 76},
     {240, 240, 220}, {120, 140, 230}, {40, 60, 200},   {130, 30, 130},
     {240, 140, 120}, {220, 20, 20},   {90, 170, 90},   {60, 200, 220},
     {110, 60, 20},   {200, 200, 200}, {230, 170, 220}, {250, 210, 40}};
-
-// Colour of a vessel by its number: hues that are far apart for neighbours.
-static void vessel_colour(uint32_t number, uint8_t rgb[3]) {
-  const uint32_t mixed = number * 2654435761u;
-  for (int k = 0; k < 3; ++k) rgb[k] = number ? (uint8_t)(64 + (mixed >> (8 * k) & 191)) : 0;
-}
-
-static sonde_status write_labels(const char *path, const sonde_interior *interior,
-                                 sonde_error *error) {
-  sonde_file *file;
-  const sonde_status status = sonde_file_create(path, &file, error);
-  if (status) return status;
-  sonde_file_printf(file, "picture,value,name,red,green,blue\n");
-  for (int k = 0; k < SONDE_LABEL_COUNT; ++k)
-    sonde_file_printf(file, "tissue,%d,%s,%d,%d,%d\n", k, sonde_truth_label_name((sonde_label)k),
-                      TISSUE[k][0], TISSUE[k][1], TISSUE[k][2]);
-  const uint32_t count = sonde_interior_vessel_count(interior);
-  for (uint32_t k = 0; k <= count && k <= MOST_VESSELS_NAMED; ++k) {
-    uint8_t rgb[3];
-    vessel_colour(k, rgb);
-    sonde_file_printf(file, "vessel,%u,%s,%d,%d,%d\n", k,
-                      k ? sonde_interior_vessel_name(interior, (int)k - 1) : "none", rgb[0], rgb[1],
-                      rgb[2]);
-  }
-  return sonde_file_commit(file, error);
-}
 
 sonde_status image_truth_write(const char *folder, const sonde_echo *echo,
                                const sonde_interior *interior, const sonde_image *image,
@@ -47,7 +19,10 @@ sonde_status image_truth_write(const char *folder, const sonde_echo *echo,
   sonde_truth truth = {0};
   char path[4096];
   uint8_t vessel[256][3];
-  for (uint32_t k = 0; k < 256; ++k) vessel_colour(k, vessel[k]);
+  // Colours of vessels are far apart for neighbours.
+  for (uint32_t k = 0; k < 256; ++k)
+    for (int c = 0; c < 3; ++c)
+      vessel[k][c] = k ? (uint8_t)(64 + (k * 2654435761u >> (8 * c) & 191)) : 0;
   sonde_status status = sonde_directory_make(folder, 0777, true, error);
   if (!status) status = sonde_truth_create(echo, image, &truth, error);
   const struct {
@@ -77,7 +52,20 @@ sonde_status image_truth_write(const char *folder, const sonde_echo *echo,
     status = sonde_truth_save_vectors(&truth, fields[k].vectors, fields[k].unit, path, error);
   }
   snprintf(path, sizeof path, "%s/labels.csv", folder);
-  if (!status) status = write_labels(path, interior, error);
+  sonde_file *file = NULL;
+  if (!status) status = sonde_file_create(path, &file, error);
+  if (!status) {
+    sonde_file_printf(file, "picture,value,name,red,green,blue\n");
+    for (int k = 0; k < SONDE_LABEL_COUNT; ++k)
+      sonde_file_printf(file, "tissue,%d,%s,%d,%d,%d\n", k, sonde_truth_label_name((sonde_label)k),
+                        TISSUE[k][0], TISSUE[k][1], TISSUE[k][2]);
+    const uint32_t count = sonde_interior_vessel_count(interior);
+    for (uint32_t k = 0; k <= count && k < 256; ++k)
+      sonde_file_printf(file, "vessel,%u,%s,%d,%d,%d\n", k,
+                        k ? sonde_interior_vessel_name(interior, (int)k - 1) : "none", vessel[k][0],
+                        vessel[k][1], vessel[k][2]);
+    status = sonde_file_commit(file, error);
+  }
   sonde_truth_clear(&truth);
   return status;
 }

@@ -35,15 +35,6 @@ static double width_of(const group *g) {
   return sqrt(sum);
 }
 
-static bool are_near(const group *a, const group *b) {
-  double sum = 0;
-  for (int k = 0; k < 3; ++k) {
-    double gap = fmax(0, fmax(a->low[k] - b->high[k], b->low[k] - a->high[k]));
-    sum += gap * gap;
-  }
-  return sqrt(sum) <= FAR * fmax(width_of(a), width_of(b));
-}
-
 // Bodies near each other make a group, and the group of most bodies is what the view shows: one
 // body that fell off does not shrink the others to a dot. Of equal groups the one with a body that
 // does not move is shown, else the wider one. Each group is found at its first body.
@@ -68,7 +59,14 @@ static bool choose_seen(figure *f) {
     joined = false;
     for (uint32_t a = 0; a < count; ++a)
       for (uint32_t b = a + 1; b < count; ++b) {
-        if (of[a] != a || of[b] != b || !are_near(&groups[a], &groups[b])) continue;
+        if (of[a] != a || of[b] != b) continue;
+        double sum = 0;
+        for (int k = 0; k < 3; ++k) {
+          const double gap = fmax(
+              0, fmax(groups[a].low[k] - groups[b].high[k], groups[b].low[k] - groups[a].high[k]));
+          sum += gap * gap;
+        }
+        if (!(sqrt(sum) <= FAR * fmax(width_of(&groups[a]), width_of(&groups[b])))) continue;
         for (int k = 0; k < 3; ++k) {
           groups[a].low[k] = fmin(groups[a].low[k], groups[b].low[k]);
           groups[a].high[k] = fmax(groups[a].high[k], groups[b].high[k]);

@@ -176,13 +176,6 @@ static sonde_status attenuation(report *r) {
   return status;
 }
 
-// Layers of the synthetic leg down to muscle, then muscle: dB both ways.
-static double loss_to(double depth_m, double mhz, double muscle_m) {
-  assert(depth_m >= muscle_m && mhz > 0);
-  double skin = 1.8e-3, fat = muscle_m - skin;
-  return 2 * mhz * (100 * skin + 50 * fat + 100 * (depth_m - muscle_m));
-}
-
 // Echo of a nearly flat cortex under the middle line, and what is left behind it.
 static sonde_status bone(report *r) {
   const double radius = 0.2, inner = 0.179, muscle = 6e-3, mhz = 4;
@@ -206,7 +199,10 @@ static sonde_status bone(report *r) {
     behind += intensity(&s, e, (region){-1e-3, 1e-3, cortex + 3e-3, cortex + 5e-3}, NULL) / frames;
   }
   // The march begins at the face: the first millimetre of skin is behind it.
-  double loss = loss_to(cortex + face, mhz, muscle) - 2 * mhz * 100 * face;
+  // Skin, fat and muscle above it, dB both ways.
+  const double skin = 1.8e-3, in_muscle = cortex + face - muscle;
+  double loss = 2 * mhz * (100 * skin + 50 * (muscle - skin) + 100 * in_muscle);
+  loss -= 2 * mhz * 100 * face;
   note(r, "specular_level_error_db", echo - (36 - loss), -0.5, 0.5,
        "+- 0.5 dB of the path integral");
   double noise = -118, expected_before = 4e-3 * 2 * mhz * 100 - loss; // of the muscle above

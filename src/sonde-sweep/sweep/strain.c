@@ -22,32 +22,28 @@ typedef struct tracker {
   uint32_t beside; // lines
 } tracker;
 
-// Correlation of the window about (sample, line) with that so many samples deeper afterwards.
-static double likeness_at(const tracker *t, int sample, uint32_t line, int lag) {
+// Displacement of a window about (sample, line), samples, and its likeness: the correlation with
+// the window that lies so much deeper afterwards.
+static double track(const tracker *t, int sample, uint32_t line, float *likeness) {
   const uint32_t left = line > t->beside ? line - t->beside : 0;
   const uint32_t right = line + t->beside < t->lines ? line + t->beside : t->lines - 1;
-  double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
-  for (int k = sample - t->half; k <= sample + t->half; ++k) {
-    if (k + lag < 0 || k + lag >= (int)t->samples) continue;
-    const float *p = t->before + (size_t)k * t->lines;
-    const float *q = t->after + (size_t)(k + lag) * t->lines;
-    for (uint32_t l = left; l <= right; ++l) {
-      const double x = (double)p[l], y = (double)q[l];
-      n += 1, a += x, b += y, aa += x * x, bb += y * y, ab += x * y;
-    }
-  }
-  const double both = (aa - a * a / n) * (bb - b * b / n);
-  return both > 0 ? (ab - a * b / n) / sqrt(both) : 0;
-}
-
-// Displacement of a window, samples, and its likeness.
-static double track(const tracker *t, int sample, uint32_t line, float *likeness) {
   double at[2 * MOST_LAGS + 1];
   int best = 0;
   SONDE_ASSERT(t->most > 0 && t->most <= MOST_LAGS);
-  for (int k = 0; k <= 2 * t->most; ++k) {
-    at[k] = likeness_at(t, sample, line, k - t->most);
-    if (at[k] > at[best]) best = k;
+  for (int lag = -t->most; lag <= t->most; ++lag) {
+    double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+    for (int k = sample - t->half; k <= sample + t->half; ++k) {
+      if (k + lag < 0 || k + lag >= (int)t->samples) continue;
+      const float *p = t->before + (size_t)k * t->lines;
+      const float *q = t->after + (size_t)(k + lag) * t->lines;
+      for (uint32_t l = left; l <= right; ++l) {
+        const double x = (double)p[l], y = (double)q[l];
+        n += 1, a += x, b += y, aa += x * x, bb += y * y, ab += x * y;
+      }
+    }
+    const double both = n > 0 ? (aa - a * a / n) * (bb - b * b / n) : 0;
+    at[lag + t->most] = both > 0 ? (ab - a * b / n) / sqrt(both) : 0;
+    if (at[lag + t->most] > at[best]) best = lag + t->most;
   }
   *likeness = (float)at[best];
   if (best == 0 || best == 2 * t->most) return best - t->most;

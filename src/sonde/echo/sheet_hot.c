@@ -20,23 +20,17 @@ void sonde_sheet_begin(sonde_echo *echo) {
   for (uint32_t n = 0; n < echo->grid_samples; ++n) echo->first_sheet[n] = -1;
 }
 
-// Amplitude of a sheet's columns. The lateral kernels undo the two linear taps that a scatterer is
-// shared between; a sheet that is spread over its columns by the same taps has the squared sinc of
-// half the phase per column.
-static float slope_share(float half_turns) {
-  SONDE_ASSERT(half_turns >= 0);
-  if (!(half_turns < none_from)) return 0;
-  float u = 0.5f * (float)SONDE_PI * half_turns, sinc = u > 1e-3f ? sinf(u) / u : 1;
-  float t = fmaxf((half_turns - whole_up_to) / (none_from - whole_up_to), 0);
-  return sinc * sinc * (1 - t * t * (3 - 2 * t));
-}
-
 // Beyond the outer lines the sheet goes on along its tangent as far as the kernels reach.
 void sonde_sheet_add(sonde_echo *echo, uint32_t line, float depth_m, float rise_m,
                      float amplitude) {
   const frame *f = &echo->frame;
   const double turn = 4 * SONDE_PI / f->wavelength_m;
-  const float size = amplitude * slope_share(4 * fabsf(rise_m) / (float)f->wavelength_m);
+  // The lateral kernels undo the two linear taps that a scatterer is shared between; a sheet that
+  // is spread over its columns by the same taps has the squared sinc of half the phase per column.
+  const float half_turns = 4 * fabsf(rise_m) / (float)f->wavelength_m;
+  const float u = 0.5f * (float)SONDE_PI * half_turns, sinc = u > 1e-3f ? sinf(u) / u : 1;
+  const float t = fminf(fmaxf((half_turns - whole_up_to) / (none_from - whole_up_to), 0), 1);
+  const float size = amplitude * (sinc * sinc * (1 - t * t * (3 - 2 * t)));
   SONDE_ASSERT(line < echo->lines && echo->pad_lines > 0);
   if (!(size > 0) || !(depth_m >= 0)) return;
   const int pad = (int)echo->pad_lines, column = pad + SONDE_FINE * (int)line;

@@ -88,27 +88,18 @@ static void find_slowness(sonde_echo *echo, const float *level) {
   }
 }
 
-// Rays on by a row; they do not cross.
-static void move_rays(sonde_sound *s, uint32_t lines, float on) {
-  int_x4 crossed = {0};
-  SONDE_ASSERT(lines > 0 && lines <= SONDE_MOST_LINES);
-  for (uint32_t l = 0; l < lines; l += 4)
-    vstore_float_x4(s->line + l, vload_float_x4(s->line + l) + on * vload_float_x4(s->turn + l));
-  for (uint32_t l = 0; l + 1 < lines; l += 4)
-    crossed |= vload_float_x4(s->line + l + 1) - vload_float_x4(s->line + l) < least_gap;
-  if (!vany(crossed)) return;
-  // Half-way between pushing them apart from the left and from the right.
+// Rays do not cross: half-way between pushing them apart from the left and from the right.
+static void part_rays(float *line, uint32_t lines) {
   float pushed[SONDE_MOST_LINES];
-  pushed[0] = s->line[0];
+  SONDE_ASSERT(lines > 0 && lines <= SONDE_MOST_LINES);
+  pushed[0] = line[0];
   for (uint32_t l = 1; l < lines; ++l) {
     const float least = pushed[l - 1] + least_gap;
-    pushed[l] = s->line[l] < least ? least : s->line[l];
+    pushed[l] = line[l] < least ? least : line[l];
   }
-  for (uint32_t l = lines - 1; l-- > 0;) {
-    const float most = s->line[l + 1] - least_gap;
-    if (s->line[l] > most) s->line[l] = most;
-  }
-  for (uint32_t l = 0; l < lines; ++l) s->line[l] = 0.5f * (s->line[l] + pushed[l]);
+  for (uint32_t l = lines - 1; l-- > 0;)
+    if (line[l] > line[l + 1] - least_gap) line[l] = line[l + 1] - least_gap;
+  for (uint32_t l = 0; l < lines; ++l) line[l] = 0.5f * (line[l] + pushed[l]);
 }
 
 void sonde_sound_step(sonde_echo *echo, uint32_t row) {
@@ -123,7 +114,13 @@ void sonde_sound_step(sonde_echo *echo, uint32_t row) {
   const float wide = fmaxf((aim - z) / (float)(2 * number) * per_m + 0.5f, 1);
   const int half = (int)fminf(wide, SOUND_MARGIN), padded = (int)echo->padded;
   // Rays and times to this row, then the turns that the row itself adds.
-  if (row > 0) move_rays(s, lines, dz * per_m);
+  int_x4 crossed = {0};
+  for (uint32_t l = 0; row > 0 && l < lines; l += 4)
+    vstore_float_x4(s->line + l,
+                    vload_float_x4(s->line + l) + dz * per_m * vload_float_x4(s->turn + l));
+  for (uint32_t l = 0; l + 1 < lines; l += 4)
+    crossed |= vload_float_x4(s->line + l + 1) - vload_float_x4(s->line + l) < least_gap;
+  if (vany(crossed)) part_rays(s->line, lines);
   float wide_sum[SOUND_WIDE + 1], *sum = wide_sum + SOUND_MARGIN;
   for (int l = -half; l <= half; ++l) {
     const int end = (int)lines - 1 + l;

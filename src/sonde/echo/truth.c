@@ -28,42 +28,6 @@ sonde_vec3 sonde_truth_drawn_at(const sonde_echo *echo, sonde_vec3 point_m) {
   return vec3(drawn.x, at.y, drawn.z);
 }
 
-// The vessel in whose section of now a point lies, up to its wall's outer face: labels and flow.
-static void find_lumen(const sonde_echo *echo, double s_m, sonde_truth_pixel *pixel) {
-  const sonde_interior *in = echo->interior;
-  bool in_wall = false;
-  // At rest a lumen, now beside it: what the wall's motion leaves out is wall.
-  const bool was_vessel = pixel->vessel > 0;
-  for (uint32_t k = 0; k < echo->shown_count; ++k) {
-    const uint32_t which = echo->shown[k];
-    const bool artery = in->course[which].kind == SONDE_VESSEL_ARTERY;
-    const double along_m = sonde_vessel_along(in, which, pixel->rest_m, s_m);
-    sonde_vessel_state v;
-    if (!sonde_vessel_at(in, which, along_m, &v)) continue;
-    const sonde_vec3 d = v_sub(pixel->point_m, v.centre_m);
-    const double a = v_dot(d, v.flat_axis) / v.half_short_m;
-    const double b = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.half_long_m;
-    if (!(a * a + b * b < 1)) {
-      in_wall = in_wall || (was_vessel && pixel->vessel == which + 1);
-      continue;
-    }
-    pixel->vessel = which + 1;
-    pixel->label = artery ? SONDE_LABEL_ARTERY : SONDE_LABEL_VEIN;
-    const double solid = sonde_echo_solid(echo, which, v.rest_centre_m.z);
-    if (solid > 0 && -a > 1 - 2 * solid + sonde_clot_surface(which, along_m, b)) {
-      pixel->label = SONDE_LABEL_THROMBUS;
-      return;
-    }
-    const double speed = sonde_blood_speed(echo, which) * 2 * (1 - a * a - b * b);
-    pixel->velocity_m_s = v_scale(v.axis, solid < 1 ? speed : 0);
-    return;
-  }
-  if (!in_wall || pixel->label == SONDE_LABEL_VEIN_WALL || pixel->label == SONDE_LABEL_ARTERY_WALL)
-    return;
-  const bool artery = in->course[pixel->vessel - 1].kind == SONDE_VESSEL_ARTERY;
-  pixel->label = artery ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
-}
-
 bool sonde_truth_at(const sonde_echo *echo, const sonde_image *image, uint32_t column, uint32_t row,
                     sonde_truth_pixel *pixel) {
   SONDE_ASSERT(echo != NULL && image != NULL && column < image->width && row < image->height);
@@ -86,7 +50,34 @@ bool sonde_truth_at(const sonde_echo *echo, const sonde_image *image, uint32_t c
       pixel->label != SONDE_LABEL_OUTSIDE && pixel->label != SONDE_LABEL_BONE &&
       sonde_vessels_label(echo->interior, pixel->rest_m, at.s, &which) != SONDE_LABEL_COUNT;
   pixel->vessel = vessel ? which + 1 : 0;
-  if (pixel->label != SONDE_LABEL_OUTSIDE && pixel->label != SONDE_LABEL_BONE)
-    find_lumen(echo, at.s, pixel);
+  if (pixel->label == SONDE_LABEL_OUTSIDE || pixel->label == SONDE_LABEL_BONE) return true;
+  // The vessel in whose section of now the point lies. At rest a lumen, now beside it: what the
+  // wall's motion leaves out is wall.
+  bool was_lumen = false, artery = false;
+  for (uint32_t k = 0; k < echo->shown_count; ++k) {
+    const uint32_t number = echo->shown[k];
+    const double along_m = sonde_vessel_along(echo->interior, number, pixel->rest_m, at.s);
+    sonde_vessel_state v;
+    if (!sonde_vessel_at(echo->interior, number, along_m, &v)) continue;
+    const bool here = echo->interior->course[number].kind == SONDE_VESSEL_ARTERY;
+    const sonde_vec3 d = v_sub(pixel->point_m, v.centre_m);
+    const double a = v_dot(d, v.flat_axis) / v.half_short_m;
+    const double b = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.half_long_m;
+    if (!(a * a + b * b < 1)) {
+      if (vessel && pixel->vessel == number + 1) was_lumen = true, artery = here;
+      continue;
+    }
+    pixel->vessel = number + 1;
+    pixel->label = here ? SONDE_LABEL_ARTERY : SONDE_LABEL_VEIN;
+    const double solid = sonde_echo_solid(echo, number, v.rest_centre_m.z);
+    if (solid > 0 && -a > 1 - 2 * solid + sonde_clot_surface(number, along_m, b)) {
+      pixel->label = SONDE_LABEL_THROMBUS;
+      return true;
+    }
+    const double speed = sonde_blood_speed(echo, number) * 2 * (1 - a * a - b * b);
+    pixel->velocity_m_s = v_scale(v.axis, solid < 1 ? speed : 0);
+    return true;
+  }
+  if (was_lumen) pixel->label = artery ? SONDE_LABEL_ARTERY_WALL : SONDE_LABEL_VEIN_WALL;
   return true;
 }

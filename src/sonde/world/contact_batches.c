@@ -171,14 +171,6 @@ static void push_batch(sonde_state *state, sonde_batches *body, uint32_t index) 
   }
 }
 
-// Where node i is evaluated.
-static sonde_vec3 place_of(const sonde_state *state, const sonde_batches *body, uint32_t i) {
-  uint32_t l = i % SONDE_BATCH;
-  const sonde_batch *at = &body->batch[i / SONDE_BATCH];
-  sonde_vec3 x = v_add(state->nodes.rest[i], sonde_batch_vector(at->u, l));
-  return v_madd(x, (double)body->step.reach, sonde_batch_vector(at->ve, l));
-}
-
 // The law VOLUME: faces of a batch clipped by the probe, exactly.
 static void clip_batch(sonde_state *state, sonde_batches *body, uint32_t index) {
   for (uint32_t l = 0; l < SONDE_BATCH; ++l) {
@@ -187,7 +179,12 @@ static void clip_batch(sonde_state *state, sonde_batches *body, uint32_t index) 
     uint32_t v[3];
     if (!(body->point_area[index][l] > 0)) continue;
     corners_of(body, index, l, v);
-    for (int k = 0; k < 3; ++k) corner[k] = place_of(state, body, v[k]);
+    for (int k = 0; k < 3; ++k) { // where the node is evaluated
+      const uint32_t lane = v[k] % SONDE_BATCH;
+      const sonde_batch *at = &body->batch[v[k] / SONDE_BATCH];
+      const sonde_vec3 x = v_add(state->nodes.rest[v[k]], sonde_batch_vector(at->u, lane));
+      corner[k] = v_madd(x, (double)body->step.reach, sonde_batch_vector(at->ve, lane));
+    }
     if (!sonde_clip_triangle(state->plane_normal, state->plane_offset, state->plane_count, corner,
                              state->inward, &clip) ||
         !(clip.area_m2 > 0))
