@@ -1,4 +1,5 @@
 // sonde image: one echographic picture of a model, at any pose.
+#include "image_colour.h"
 #include "image_findings.h"
 #include "image_strain.h"
 #include "image_truth.h"
@@ -20,20 +21,24 @@ typedef struct options {
   double force_n, press_m, turn_rad, aperture_m, radius_m; // NaN when not asked for
   sonde_echo_settings settings;
   image_findings findings;
+  image_colour colour;
+  image_colour_result flow;
 } options;
 
 static void prepare(void *to) {
-  *(options *)to = (options){.site = -1,
-                             .probe = "linear",
-                             .pathology = "healthy",
-                             .scanner = "venous",
-                             .size = {512, 512},
-                             .numbers = {NAN},
-                             .force_n = NAN,
-                             .press_m = NAN,
-                             .aperture_m = NAN,
-                             .radius_m = NAN,
-                             .settings = sonde_echo_settings_default()};
+  *(options *)to = (options){
+      .site = -1,
+      .probe = "linear",
+      .pathology = "healthy",
+      .scanner = "venous",
+      .size = {512, 512},
+      .numbers = {NAN},
+      .force_n = NAN,
+      .press_m = NAN,
+      .aperture_m = NAN,
+      .radius_m = NAN,
+      .settings = sonde_echo_settings_default(),
+      .colour = {.scale_m_s = NAN, .steer_rad = NAN, .box_m = {NAN}, .at_s = 3, .squeeze_s = NAN}};
 }
 
 // The farthest that a probe may be from the model's origin, as for the page's goals.
@@ -86,6 +91,18 @@ static const app_option TABLE[] = {
              "press half a millimetre further and write the strain that tracked echoes show "
              "(strain.png), the true one (strain_true.png) and both as strain.csv; flat faces"),
     OPT_JSON(json),
+    OPT_GROUP("Colour Doppler"),
+    OPT_FLAG(colour.on, "colour", "lay the blood's velocity along the beam over the picture"),
+    OPT_FLAG(colour.power, "power", "show how much blood moves instead of how fast"),
+    OPT_REAL(colour.scale_m_s, "scale-cm-s", "V", 1, 300, 1e-2,
+             "velocity along the beam from which colour folds; default above the fastest blood"),
+    OPT_REAL(colour.steer_rad, "steer-deg", "A", -25, 25, 3.14159265358979323846 / 180,
+             "of the colour's beam to the right; default 0 or 20, as the vessels need it"),
+    OPT_NUMBERS(colour.box_m, "box", "LEFT:RIGHT,TOP:BOTTOM", -300, 300,
+                "where the colour is, mm; default the whole picture"),
+    OPT_REAL(colour.at_s, "at-s", "T", 0, 60, 1, "time since the heart's first beat; default 3"),
+    OPT_REAL(colour.squeeze_s, "squeeze-s", "T", 0, 60, 1, "a hand squeezes the calf at T"),
+    OPT_OUTPUT(colour.cells, "cells", "CSV", "write true and shown velocity of each cell"),
     OPT_GROUP("The scanner"),
     OPT_TEXT(
         scanner, "scanner", "NAME|FILE",
@@ -143,6 +160,12 @@ static int check(void *from) {
                            "--aperture-mm %g is an arc of %.0f degrees of --curved-mm %g, expected "
                            "at most 180",
                            1e3 * o->aperture_m, 45 * arc_rad / atan(1), 1e3 * o->radius_m);
+  double *box = o->colour.box_m;
+  for (int k = 0; k < 4 && !isnan(box[0]); ++k) box[k] *= 1e-3;
+  if (!isnan(box[0]) && !(box[0] < box[1] && box[2] >= 0 && box[2] < box[3]))
+    return app_usage_error("image", "--box expects LEFT < RIGHT and 0 <= TOP < BOTTOM");
+  if (o->colour.on && o->radius_m > 0)
+    return app_usage_error("image", "--colour needs a flat face, not --curved-mm");
   return APP_OK;
 }
 
@@ -217,6 +240,7 @@ static sonde_status report(options *o, drawing *d, sonde_error *error) {
     app_json("vein_drawn_mm:%g artery_drawn_mm:%g", 1e3 * drawn_m[0], 1e3 * drawn_m[1]);
     settled_branches(&d->s, true);
   }
+  if (o->colour.on) image_colour_tell(&o->flow, &d->s, o->json);
   image_strain strain = {.echo = d->echo,
                          .pathology = &d->pathology,
                          .settings = &o->settings,
@@ -274,7 +298,10 @@ static int run(void *from) {
     const uint32_t lost = sonde_echo_last_times(d.echo).lost;
     if (lost)
       fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
-    status = sonde_image_save_png(&d.image, o->out, &error);
+    status = !o->colour.on ? sonde_image_save_png(&d.image, o->out, &error)
+                           : image_colour_draw(&o->colour, &d.s, d.echo, &d.image, d.aperture_m,
+                                               o->settings.frequency_hz, (uint64_t)o->seed, o->out,
+                                               &o->flow, &error);
   }
   if (!status && o->truth)
     status = image_truth_write(o->truth, d.echo, d.s.interior, &d.image, &error);
@@ -298,5 +325,7 @@ const app_command cmd_image = {
     .prepare = prepare,
     .required = "o",
     .not_both = "force-n press-mm",
+    .needs = "power>colour scale-cm-s>colour steer-deg>colour box>colour at-s>colour "
+             "squeeze-s>colour cells>colour",
     .check = check,
     .run = run};

@@ -58,6 +58,11 @@ view saphenous 2 50 --force-n 1
 view confluence 3 50 --force-n 1
 view thigh 5 60 --force-n 2
 view thigh_pressed 5 60 --force-n 12
+view groin_colour 1 50 --force-n 1 --colour
+view groin_colour_along 1 50 --force-n 1 --turn-deg 90 --colour
+view thigh_colour 5 60 --force-n 2 --colour
+view thigh_colour_pressed 5 60 --force-n 12 --colour
+view thigh_colour_slow 5 60 --force-n 2 --colour --scale-cm-s 2
 view knee 8 50 --force-n 4
 view knee_along 8 50 --turn-deg 90 --force-n 4
 view tibial 10 50 --force-n 2

@@ -42,6 +42,7 @@
 #include "sonde/files_scanner.h"
 #include "sonde/solid.h"
 #include "sonde/flow.h"
+#include "sonde/flow_colour.h"
 #include "sonde/limb.h"
 #include "sonde/limb_model.h"
 #include "sonde/limb_pose.h"

@@ -1,0 +1,116 @@
+/**
+ * @file flow_colour.h
+ * Colour Doppler: what flows in the vessels of a pressed model, laid on a grid of cells in the
+ * image plane, and the autocorrelation estimate that a scanner makes of it from packets of pulses.
+ * docs/flow.md, docs/flow_theory.md.
+ */
+#ifndef SONDE_FLOW_COLOUR_H
+#define SONDE_FLOW_COLOUR_H
+
+#include "sonde/echo.h"
+#include "sonde/flow.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+  SONDE_COLOUR_LINES = 96,
+  SONDE_COLOUR_ROWS = 128,
+  SONDE_COLOUR_CELLS = SONDE_COLOUR_LINES * SONDE_COLOUR_ROWS
+};
+#define SONDE_COLOUR_NO_VESSEL UINT32_MAX
+
+/** Where the colour is: a box of the image plane whose sides lean with the beam. */
+typedef struct sonde_colour_box {
+  double left_m, right_m; /**< at the face, x of the probe frame */
+  double top_m, bottom_m; /**< depths */
+  double steer_rad;       /**< of the beam towards +x, -0.5 to 0.5 */
+} sonde_colour_box;
+/** Middle of a cell in the image plane: x and z of the probe frame, m. @thread any (tick) */
+SONDE_API void sonde_colour_place(const sonde_colour_box *box, uint32_t line, uint32_t row,
+                                  double xz_m[2]);
+/** The cell of a place in the image plane, in whole cells and shares of them from the middle of the
+ * first; false beside the box. @thread any (tick) */
+SONDE_API bool sonde_colour_find(const sonde_colour_box *box, double x_m, double z_m,
+                                 double line_row[2]);
+
+/** What moves in a cell. */
+typedef struct sonde_colour_cell {
+  float towards_m_s; /**< along the beam, towards the probe */
+  float across_m_s;  /**< across it */
+  uint32_t vessel;   /**< whose blood it is, or SONDE_COLOUR_NO_VESSEL: tissue */
+} sonde_colour_cell;
+
+/** The chain behind the colour. */
+typedef struct sonde_colour_def {
+  double frequency_hz, pulse_hz; /**< carrier, 1e6 to 2e7; pulse repetition, 100 to 2e4 */
+  uint32_t packet;               /**< pulses per estimate, 4 to 16; default 10 */
+  uint32_t filter_order;         /**< of the polynomials that the wall filter takes out, 0 to 3;
+                                      default 1 */
+  double beam_m;                 /**< standard deviation of the beam's width; default 0.45 mm */
+  double noise_db, clutter_db;   /**< noise over the blood's echo, default -15; tissue's, 35 */
+  double persistence;            /**< share of the estimate before, 0 to 0.95; default 0 */
+  uint64_t seed;                 /**< of scatterers and noise */
+} sonde_colour_def;
+SONDE_API sonde_colour_def sonde_colour_def_default(void); /**< @thread any */
+/** Highest velocity along the beam that is not folded: c pulse_hz / (4 f). @thread any */
+SONDE_API double sonde_colour_limit(const sonde_colour_def *def);
+
+typedef struct sonde_colour sonde_colour;
+/** @return ARGUMENT naming the value, MEMORY. @thread owner */
+SONDE_API sonde_status sonde_colour_create(const sonde_colour_def *def, sonde_colour **colour,
+                                           sonde_error *error);
+SONDE_API void sonde_colour_destroy(sonde_colour *colour); /**< NULL is fine. @thread owner */
+
+/** What the estimate holds of a cell. */
+typedef struct sonde_colour_value {
+  float velocity_m_s; /**< towards the probe, folded at the limit */
+  float power;        /**< behind the wall filter, over what noise alone leaves there */
+} sonde_colour_value;
+/** Power from which a cell is shown in colour: noise alone stays below. */
+#define SONDE_COLOUR_POWER 2.5f
+
+/**
+ * A packet of pulses on every cell: blood that moves and loses its pattern with the beam's passage,
+ * mixed over neighbours by the beam, tissue, noise; wall filter, lag-one autocorrelation, averages
+ * over 3 x 3 cells, persistence.
+ * @param cells [SONDE_COLOUR_CELLS] row by row; lines beside each other
+ * @param tissue_m_s motion of the tissue towards the probe
+ * @return [SONDE_COLOUR_CELLS] owned by the colour, until the next frame
+ * @thread tick
+ */
+SONDE_API const sonde_colour_value *
+sonde_colour_frame(sonde_colour *colour, const sonde_colour_cell *cells, double tissue_m_s);
+
+/* ---- vessels of a pressed model ----------------------------------------------------------- */
+
+/** The vessels of an interior with what the network lets flow in them. */
+typedef struct sonde_flow_scene sonde_flow_scene;
+/** @param limb of the model, NULL: typical veins @param interior borrowed
+ *  @return MEMORY @thread owner */
+SONDE_API sonde_status sonde_flow_scene_create(const sonde_limb *limb,
+                                               const sonde_interior *interior,
+                                               sonde_flow_scene **scene, sonde_error *error);
+SONDE_API void sonde_flow_scene_destroy(sonde_flow_scene *scene); /**< @thread owner */
+/** Sets what is closed of the veins of a definition to what probe and clots leave of the sections
+ *  now: the share that gives the vein's whole length its resistance. @thread owner */
+SONDE_API void sonde_flow_scene_narrow(const sonde_flow_scene *scene, sonde_flow_def *def);
+/** Runs a network, started or not, to a time and takes flows and profiles; arteries at the heart's
+ *  share of the beat. @thread owner */
+SONDE_API void sonde_flow_scene_run(sonde_flow_scene *scene, sonde_flow *flow, double until_s);
+/** What moves in the cells of a box now: lumina as the interior has them, at the places where the
+ *  echo's last picture draws them.
+ *  @param[out] cells [SONDE_COLOUR_CELLS] @thread owner; no allocation */
+SONDE_API void sonde_flow_scene_cells(const sonde_flow_scene *scene, const sonde_echo *echo,
+                                      const sonde_colour_box *box, sonde_colour_cell *cells);
+/** Mean velocity of a vessel of the interior towards the heart (veins) or away from it (arteries)
+ *  in the section that lies nearest to the probe's axis, m/s; 0 when it is closed.
+ *  @thread owner */
+SONDE_API double sonde_flow_scene_velocity(const sonde_flow_scene *scene, uint32_t vessel,
+                                           sonde_pose world_from_probe);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,34 @@
+// Inside of the colour estimate.
+#ifndef SONDE_SRC_FLOW_COLOUR_H
+#define SONDE_SRC_FLOW_COLOUR_H
+
+#include "sonde/flow_colour.h"
+
+enum { COLOUR_PACKET = 16, COLOUR_ORDER = 3, COLOUR_NORMALS = 1 << 16 };
+#define COLOUR_SOUND_M_S 1540.0
+
+struct sonde_colour {
+  sonde_colour_def def;
+  uint64_t frames;
+  float normal[COLOUR_NORMALS + SONDE_COLOUR_CELLS];
+  float poly[COLOUR_ORDER + 1][COLOUR_PACKET]; // orthonormal over the packet
+  uint32_t blood_count;
+  uint32_t blood[SONDE_COLOUR_CELLS];               // cells with blood
+  float pattern[SONDE_COLOUR_CELLS][2];             // of the blood of each of them
+  float turn[SONDE_COLOUR_CELLS][2];                // of its phase from pulse to pulse
+  float keep[SONDE_COLOUR_CELLS];                   // of its pattern
+  float echo[COLOUR_PACKET][2][SONDE_COLOUR_CELLS]; // the packet
+  float lag[3][SONDE_COLOUR_CELLS];                 // autocorrelation at 1, complex, and at 0
+  float held[3][SONDE_COLOUR_CELLS];                // its averages
+  sonde_colour_value value[SONDE_COLOUR_CELLS];
+};
+
+// Stages of a frame, in order (colour_hot.c); `drawn` counts random numbers.
+void colour_begin_echoes(sonde_colour *c, const sonde_colour_cell *cells, double tissue_m_s,
+                         uint32_t *drawn);
+void colour_begin_blood(sonde_colour *c, const sonde_colour_cell *cells, uint32_t *drawn);
+void colour_add_blood(sonde_colour *c, uint32_t pulse, uint32_t *drawn);
+void colour_correlate(sonde_colour *c);
+void colour_average(sonde_colour *c);
+
+#endif

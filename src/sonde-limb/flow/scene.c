@@ -1,0 +1,154 @@
+// What flows in the vessels of a pressed model: which segment of the network each section belongs
+// to, what probe and clots leave open of them, flows and profiles at a time.
+#include "flow/scene.h"
+
+#include "base/base.h"
+#include "flow/blood.h"
+#include "sonde/limb_model.h"
+
+#include <string.h>
+
+// Veins that the network has by themselves, by the limb's names; any other deep vein flows as the
+// calf's main one, any other superficial one as the great saphenous.
+static const struct {
+  const char *name;
+  sonde_flow_segment segment;
+  uint32_t vein;
+} VEIN[] = {{"external iliac vein", SONDE_FLOW_EXTERNAL_ILIAC, 0},
+            {"common femoral vein", SONDE_FLOW_COMMON_FEMORAL, 0},
+            {"femoral vein", SONDE_FLOW_FEMORAL, 0},
+            {"second femoral vein", SONDE_FLOW_FEMORAL, 1},
+            {"third femoral vein", SONDE_FLOW_FEMORAL, 1},
+            {"popliteal vein", SONDE_FLOW_POPLITEAL, 0},
+            {"second popliteal vein", SONDE_FLOW_POPLITEAL, 1},
+            {"tibioperoneal trunk vein", SONDE_FLOW_CALF, SCENE_WHOLE},
+            {"deep femoral vein", SONDE_FLOW_DEEP_FEMORAL, 0},
+            {"great saphenous vein", SONDE_FLOW_GREAT_SAPHENOUS, 0},
+            {"great saphenous", SONDE_FLOW_GREAT_SAPHENOUS, 0},
+            {"small saphenous", SONDE_FLOW_CALF, SCENE_OTHER}};
+
+static void find_vein(const char *name, scene_section *section) {
+  const bool superficial = strstr(name, "saphenous") || strstr(name, "superficial") ||
+                           strstr(name, "epigastric") || strstr(name, "pudendal");
+  section->segment = superficial ? SONDE_FLOW_GREAT_SAPHENOUS : SONDE_FLOW_CALF;
+  section->vein = SCENE_OTHER;
+  for (size_t k = 0; k < SONDE_COUNT_OF(VEIN); ++k)
+    if (strcmp(VEIN[k].name, name) == 0)
+      section->segment = VEIN[k].segment, section->vein = VEIN[k].vein;
+}
+
+sonde_status sonde_flow_scene_create(const sonde_limb *limb, const sonde_interior *in,
+                                     sonde_flow_scene **out, sonde_error *error) {
+  SONDE_ASSERT(in && out);
+  *out = NULL;
+  uint32_t sections = 0;
+  for (uint32_t v = 0; v < in->vessel_count; ++v) sections += in->course[v].count;
+  sonde_flow_scene *s = SONDE_NEW(sonde_flow_scene, 1);
+  scene_section *all = SONDE_NEW(scene_section, sections + 1);
+  if (!s || !all) {
+    sonde_free(s), sonde_free(all);
+    return sonde_fail_memory(error);
+  }
+  s->interior = in, s->all = all;
+  for (uint32_t v = 0; v < in->vessel_count; ++v) {
+    s->section[v] = all, all += in->course[v].count;
+    char name[SONDE_LIMB_VESSEL_NAME];
+    snprintf(name, sizeof name, "%s", sonde_interior_vessel_name(in, (int)v));
+    for (char *c = name; *c; ++c) *c = *c == '_' ? ' ' : *c;
+    for (uint32_t i = 0; i < in->course[v].count; ++i) {
+      const sonde_vessel_section *at = &in->section[v][i];
+      scene_section *section = &s->section[v][i];
+      find_vein(name, section);
+      // Models of legs have z downwards; a limb knows each branch's way.
+      section->upwards = at->axis.z > 0 ? -1 : 1, section->share = 1;
+      if (!limb) continue;
+      const sonde_vec3 point = sonde_limb_to_model(limb, at->rest_m);
+      const sonde_limb_vessel_near near = sonde_limb_vessel_at(limb, point);
+      const sonde_vec3 distal = sonde_limb_vessel_place(limb, near.vessel, near.arc_m).direction;
+      const sonde_limb_vessel branch = sonde_limb_vessel_get(limb, near.vessel);
+      if ((branch.kind == SONDE_LIMB_ARTERY) != (in->course[v].kind == SONDE_VESSEL_ARTERY))
+        continue;
+      section->upwards =
+          distal.x * at->axis.x + distal.y * at->axis.y - distal.z * at->axis.z > 0 ? -1 : 1;
+      if (v == 0) find_vein(branch.name, section);
+      const double least = 0.1;
+      if (section->segment == SONDE_FLOW_CALF || section->segment >= SONDE_FLOW_DEEP_FEMORAL)
+        section->share = fmax(1 - near.arc_m / branch.length_m, least);
+    }
+  }
+  *out = s;
+  return SONDE_OK;
+}
+
+void sonde_flow_scene_destroy(sonde_flow_scene *scene) {
+  if (scene) sonde_free(scene->all);
+  sonde_free(scene);
+}
+
+void sonde_flow_scene_narrow(const sonde_flow_scene *s, sonde_flow_def *def) {
+  SONDE_ASSERT(s && def);
+  const sonde_interior *in = s->interior;
+  double sum[SONDE_FLOW_SEGMENTS][SONDE_FLOW_VEINS] = {{0}};
+  uint32_t count[SONDE_FLOW_SEGMENTS][SONDE_FLOW_VEINS] = {{0}};
+  for (uint32_t v = 0; v < in->vessel_count; ++v) {
+    if (in->course[v].kind != SONDE_VESSEL_VEIN) continue;
+    for (uint32_t i = 0; i < in->course[v].count; ++i) {
+      const scene_section *section = &s->section[v][i];
+      if (section->vein >= SONDE_FLOW_VEINS) continue;
+      // Conductance over that of the round lumen at rest: an ellipse's 2 a^3 b^3/(a^2 + b^2), of
+      // what a clot leaves as if it were an even share. Wider than at rest counts as rest: the
+      // network widens its veins itself.
+      const sonde_vessel_state *at = &in->state[v][i];
+      const double a = at->half_short_m / at->rest_radius_m,
+                   b = at->half_long_m / at->rest_radius_m;
+      const double conducts = 2 * pow(scene_open(s, v, i), 2) * pow(a * b, 3) / (a * a + b * b);
+      sum[section->segment][section->vein] += 1 / fmax(fmin(conducts, 1), 1e-9);
+      ++count[section->segment][section->vein];
+    }
+  }
+  for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k)
+    for (int v = 0; v < SONDE_FLOW_VEINS; ++v) {
+      if (count[k][v] == 0) continue;
+      const double kept = sqrt(count[k][v] / sum[k][v]);
+      def->closed[k][v] = 1 - (1 - def->closed[k][v]) * (kept < 1e-2 ? 0 : kept);
+    }
+}
+
+void sonde_flow_scene_run(sonde_flow_scene *s, sonde_flow *flow, double until_s) {
+  SONDE_ASSERT(s && flow && isfinite(until_s));
+  const double step_s = 1e-3;
+  for (int k = 0; k < SONDE_FLOW_SEGMENTS && flow->time_s <= 0; ++k)
+    sonde_flow_steady(sonde_flow_velocity(flow, (sonde_flow_segment)k), s->profile[k]);
+  while (flow->time_s < until_s - 1e-9) {
+    sonde_flow_step(flow, step_s);
+    for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k) {
+      const double area = sonde_flow_area(flow, (sonde_flow_segment)k, 0);
+      if (area > 0)
+        sonde_flow_follow(s->profile[k], sqrt(area / SONDE_PI),
+                          sonde_flow_velocity(flow, (sonde_flow_segment)k), step_s);
+    }
+  }
+  s->flow = *flow;
+  enum { SAMPLES = 64 };
+  double wave[SAMPLES];
+  for (int k = 0; k < SAMPLES; ++k) wave[k] = sonde_flow_artery((double)k / SAMPLES);
+  const double beat = flow->def.heart_rate_hz * flow->time_s;
+  s->artery_m_s = sonde_flow_artery(beat);
+  // One profile for all arteries, of the size of the thigh's.
+  const double radius_m = 3.5e-3;
+  sonde_flow_pulsed(wave, SAMPLES, radius_m, flow->def.heart_rate_hz, beat - floor(beat),
+                    s->artery_profile);
+}
+
+double sonde_flow_scene_velocity(const sonde_flow_scene *s, uint32_t vessel, sonde_pose pose) {
+  SONDE_ASSERT(s && vessel < s->interior->vessel_count);
+  const sonde_interior *in = s->interior;
+  uint32_t nearest = 0;
+  double least = INFINITY;
+  for (uint32_t i = 0; i < in->course[vessel].count; ++i) {
+    const sonde_vec3 at = pose_apply_inverse(pose, in->state[vessel][i].centre_m);
+    const double beside = at.x * at.x + at.y * at.y;
+    if (beside < least) least = beside, nearest = i;
+  }
+  return isfinite(least) ? scene_mean(s, vessel, nearest) : 0;
+}
