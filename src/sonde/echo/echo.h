@@ -173,7 +173,7 @@ struct sonde_echo {
   float *log;         // [samples][padded + 2 DISPLAY_MARGIN] grey before the filter, edges repeated
   float *coarse;      // [samples][padded + 2 DISPLAY_MARGIN] means over some rows of it
   float *blurred;     // [samples][padded + 2 DISPLAY_MARGIN] means of 3 x 3 of these
-  float (*tensor)[3]; // [samples][padded / 4] of their slopes
+  float (*tensor)[3]; // [samples][padded / 8] of their slopes
   float *held;        // [samples][padded] the picture before, for persistence
   bool is_held;       // there is one
   float map[SONDE_MAP_STEPS + 1]; // grey values of the scanner's map

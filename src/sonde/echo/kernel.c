@@ -5,6 +5,7 @@
 #include "echo/kernel_walls.h"
 #include "echo/kernel_splat.h"
 #include "echo/kernel_beam.h"
+#include "echo/kernel_display.h"
 #include "echo/kernel_picture.h"
 
 const echo_kernels SONDE_KERNELS = {SONDE_KERNELS_NAME,
@@ -21,4 +22,6 @@ const echo_kernels SONDE_KERNELS = {SONDE_KERNELS_NAME,
                                     fade,
                                     convert,
                                     look,
-                                    compress};
+                                    compress,
+                                    smooth_lines,
+                                    show};

@@ -6,7 +6,6 @@
 #include "echo/plane.h"
 #include "echo/psf.h"
 
-#include <stdbool.h>
 #include <stdint.h>
 
 enum {
@@ -235,6 +234,8 @@ typedef struct echo_kernels {
   void (*convert)(const convert_job *job);
   void (*look)(const look_job *job);
   void (*compress)(const compress_job *job);
+  void (*smooth_lines)(const smooth_job *job);
+  void (*show)(const show_job *job);
 } echo_kernels;
 
 // The widest kernels that this processor runs, or those called `name`: avx512, avx2, sse4, base,

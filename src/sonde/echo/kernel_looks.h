@@ -62,6 +62,31 @@ typedef struct compress_job {
   float *envelope, *grey; // [lines]
 } compress_job;
 
+// Grey values before the map of some samples of a block of lines, smoothed along one direction:
+// taps from each point, each between two lines. Rows beyond the picture are its outer ones.
+enum { SMOOTH_LINES = 8, SMOOTH_TAPS = 5 };
+static const float smooth_bell[SMOOTH_TAPS] = {0.11f, 0.24f, 0.30f, 0.24f, 0.11f};
+typedef struct smooth_job {
+  const float *log; // of the block's first line, first sample of the picture
+  uint32_t stride, samples, first, end;
+  int32_t row[SMOOTH_TAPS], line[SMOOTH_TAPS];
+  float next[SMOOTH_TAPS]; // share of the line behind
+  float weight;            // of the smoothed value
+  float *out;              // of the block's first line, sample `first`
+  uint32_t out_stride;
+} smooth_job;
+
+// A row of grey values in place: sharpened, mixed with the picture before, mapped.
+typedef struct show_job {
+  float *grey;              // [lines]
+  const float *top, *low;   // [lines] two rows of its blur
+  float share, sharp, keep; // of the way from top to low; of what the blur takes away; of `held`
+  float *held;              // [lines] what the picture before showed and this one shows; NULL
+  const float *map;         // [steps + 1]
+  float steps;
+  uint32_t lines; // multiple of ECHO_ALIGN
+} show_job;
+
 // A row of pixels from [samples][lines] grey values.
 typedef struct convert_job {
   const float *grey;

@@ -218,6 +218,40 @@ static void compress(const compress_job *job) {
   }
 }
 
+static void smooth_lines(const smooth_job *job) {
+  for (uint32_t n = job->first; n < job->end; ++n)
+    for (int l = 0; l < SMOOTH_LINES; ++l) {
+      const double value = (double)job->log[(size_t)n * job->stride + (size_t)l];
+      double smooth = 0;
+      for (int t = 0; t < SMOOTH_TAPS && job->weight > 0; ++t) {
+        const double at = fmin(fmax((double)n + job->row[t], 0), job->samples - 1.0);
+        const float *p = job->log + (ptrdiff_t)at * job->stride + job->line[t] + l;
+        smooth += (double)smooth_bell[t] *
+                  ((double)p[0] + (double)job->next[t] * ((double)p[1] - (double)p[0]));
+      }
+      job->out[(size_t)(n - job->first) * job->out_stride + (size_t)l] =
+          (float)(value + (double)job->weight * (smooth - value));
+    }
+}
+
+static void show(const show_job *job) {
+  for (uint32_t l = 0; l < job->lines; ++l) {
+    double value = (double)job->grey[l];
+    if (job->sharp > 0) {
+      const double top = (double)job->top[l], low = (double)job->low[l];
+      value += (double)job->sharp * (value - (top + (double)job->share * (low - top)));
+    }
+    if (job->keep > 0) {
+      const double change = value - (double)job->held[l];
+      const double still = fmin(fmax(2 - fabs(change) / 20, 0), 1);
+      value = (double)job->held[l] + (1 - (double)job->keep * still) * change;
+    }
+    if (job->held) job->held[l] = (float)value;
+    const double shown = fmin(fmax(value, 0), 255);
+    job->grey[l] = job->map[(int)(shown * (double)job->steps / 255 + 0.5)];
+  }
+}
+
 // Weights of four values at -1, 0, 1 and 2 that make a Catmull-Rom spline at t in [0, 1].
 static void cubic_weights(double t, double w[4]) {
   w[0] = 0.5 * t * (-1 + t * (2 - t)), w[1] = 0.5 * (2 + t * t * (-5 + 3 * t));
@@ -265,6 +299,6 @@ static void convert(const convert_job *job) {
   }
 }
 
-const echo_kernels sonde_echo_kernels_plain = {"plain", splat, warp,    smooth, stream,
-                                               lateral, axial, tissue,  merge,  widen,
-                                               mix,     fade,  convert, look,   compress};
+const echo_kernels sonde_echo_kernels_plain = {
+    "plain", splat, warp, smooth,  stream, lateral,  axial,        tissue, merge,
+    widen,   mix,   fade, convert, look,   compress, smooth_lines, show};
