@@ -134,9 +134,9 @@ INLINE septum septum_at(knots *memory, floats theta, floats s, floats depth) {
   const float per_m = 450;
   floats bend = texture(memory, theta, s * 160, depth * 300, 2 * TURNS_FAT, 14);
   floats w = depth * per_m + 0.6f * bend, nearest = vfloor(w + 0.5f);
-  floats patch = texture(memory, theta, s * 170, nearest + 0.5f, 2 * TURNS_FAT, 0);
+  floats patch = texture(memory, theta, s * 280, nearest + 0.5f, 3 * TURNS_FAT, 0);
   return (septum){(w - nearest) * (1 / per_m),
-                  vmin(vmax(0.35f + 1.3f * patch, vset(0)), vset(1.2f))};
+                  vmin(vmax(0.15f + 1.6f * patch, vset(0)), vset(1.2f))};
 }
 
 // Oedema: fluid in clefts around lobules of 6 by 8 mm, 0..1.

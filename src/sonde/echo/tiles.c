@@ -104,15 +104,15 @@ static void pack(const draft *d, uint32_t *word) {
 // 1.6 and 0.57 mm in patches, a few upright ones every 4 mm, and dark grain.
 static void draw_fat(draft *d, uint32_t *word) {
   float *bend = d->noise[0], *fine = d->noise[1], *strength = d->noise[2], *other = d->noise[3];
-  const sheets first = {10, 1.6f, 0.22f, 2.6f, 0.5f, 0.5f};
-  const sheets second = {28, 0.57f, 0.16f, 1.3f, 0.4f, 0.5f};
+  const sheets first = {10, 1.6f, 0.22f, 2.6f, 0.3f, 0.7f};
+  const sheets second = {28, 0.57f, 0.16f, 1.3f, 0.3f, 0.65f};
   const sheets upright = {8, 4, 0.35f, 1.0f, -0.1f, 0.6f};
-  draw_noise(d, bend, 6, 6, 5);
+  draw_noise(d, bend, 10, 10, 5);
   draw_noise(d, fine, 13, 13, 8);
   for (uint32_t i = 0; i < VOXELS; ++i) bend[i] += 0.35f * fine[i];
-  draw_noise(d, strength, 7, 7, 10);
+  draw_noise(d, strength, 12, 12, 10);
   add_sheets(d->facing, &first, bend, 0.32f, strength);
-  draw_noise(d, strength, 15, 15, 28);
+  draw_noise(d, strength, 22, 22, 28);
   add_sheets(d->facing, &second, bend, 0.9f, strength);
   draw_noise(d, strength, 8, 8, 10);
   draw_noise(d, other, 16, 16, 16);
@@ -125,21 +125,21 @@ static void draw_fat(draft *d, uint32_t *word) {
 }
 
 // Fascicles between sheets of perimysium, in 19.2 mm across x 51.2 mm along the fibres (y) x 16 mm:
-// sheets every 1.33 and 0.62 mm, 0.5 to 1 mm thick, in patches 1.6 mm wide and 6.4 mm long, upright
+// sheets every 1.33 and 0.62 mm, 0.5 to 1 mm thick, in patches 1.6 mm wide and 3 mm long, upright
 // ones every 2.4 mm, bundles of 0.45 mm.
 static void draw_muscle(draft *d, uint32_t *word) {
   float *bend = d->noise[0], *fine = d->noise[1], *strength = d->noise[2], *other = d->noise[3];
   const sheets first = {12, 1.33f, 0.36f, 2.8f, 0.35f, 0.6f};
   const sheets second = {26, 0.62f, 0.22f, 1.0f, 0.3f, 0.55f};
   const sheets upright = {8, 2.4f, 0.35f, 0.5f, 0.2f, 0.6f};
-  draw_noise(d, bend, 7, 5, 6);
-  draw_noise(d, fine, 14, 5, 12);
+  draw_noise(d, bend, 9, 12, 6);
+  draw_noise(d, fine, 14, 12, 12);
   for (uint32_t i = 0; i < VOXELS; ++i) bend[i] += 0.4f * fine[i];
-  draw_noise(d, strength, 12, 8, 12);
+  draw_noise(d, strength, 12, 17, 12);
   add_sheets(d->facing, &first, bend, 0.35f, strength);
-  draw_noise(d, strength, 22, 9, 26);
+  draw_noise(d, strength, 22, 19, 26);
   add_sheets(d->facing, &second, bend, 0.8f, strength);
-  draw_noise(d, strength, 9, 8, 12);
+  draw_noise(d, strength, 9, 12, 12);
   draw_noise(d, other, 10, 5, 10);
   add_upright(d->body, 0, &upright, other, 0.3f, strength);
   draw_noise(d, fine, 42, 6, 36);
