@@ -82,24 +82,6 @@ static sonde_status check(const sonde_batch_def *def, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Above the first station, else the first site, else the groin end of the vein.
-static sonde_pose first_place(const sonde_case_setup *setup) {
-  const sonde_vein_map *map = &setup->map;
-  const sonde_model *model = setup->model;
-  if (!map->station_count && model->site_count) return sonde_site_pose(model->sites, -ABOVE_M);
-  sonde_pose pose = {.rotation = quat_identity()};
-  if (map->station_count) {
-    pose = map->station[0].probe;
-    pose.position = v_madd(pose.position, -ABOVE_M, q_rotate(pose.rotation, vec3(0, 0, 1)));
-  } else if (map->point_count) {
-    const sonde_vein_point *p = &map->point[0];
-    sonde_site site = {.position_m = p->skin_m, .normal = p->normal, .u = p->across};
-    site.v = v_cross(site.u, site.normal);
-    pose = sonde_site_pose(&site, -ABOVE_M);
-  }
-  return pose;
-}
-
 static sonde_status open_one(void *user, uint32_t worker, uint32_t item, const atomic_bool *stop,
                              sonde_error *error) {
   sonde_batch *batch = user;
@@ -125,10 +107,25 @@ static sonde_status create_parts(sonde_batch *batch, sonde_error *error) {
       !batch->vessel || !batch->time_s || !batch->flags || (picture && !batch->pixels))
     return sonde_fail_memory(error);
   for (uint32_t k = 0; k < def->patient_count; ++k) {
+    // A probe starts above the first station, else the first site, else the vein's groin end.
     const sonde_case_setup *setup = def->patients[k];
+    const sonde_vein_point *p = &setup->map.point[0];
+    sonde_pose above = {.rotation = quat_identity()};
+    if (setup->map.station_count) {
+      above = setup->map.station[0].probe;
+    } else if (setup->model->site_count) {
+      above = sonde_site_pose(setup->model->sites, 0);
+    } else if (setup->map.point_count) {
+      const sonde_site site = {.position_m = p->skin_m,
+                               .normal = p->normal,
+                               .u = p->across,
+                               .v = v_cross(p->across, p->normal)};
+      above = sonde_site_pose(&site, 0);
+    }
+    above.position = v_madd(above.position, -ABOVE_M, q_rotate(above.rotation, vec3(0, 0, 1)));
     batch->patients[k].setup = setup;
     batch->patients[k].start =
-        (sonde_batch_start){first_place(setup), setup->pathology, 1, 1, 1, batch->scanner.settings};
+        (sonde_batch_start){above, setup->pathology, 1, 1, 1, batch->scanner.settings};
   }
   for (uint32_t i = 0; i < n; ++i) {
     sonde_environment *env = &batch->environments[i];

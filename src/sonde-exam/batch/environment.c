@@ -20,8 +20,10 @@ static sonde_session_controls controls_of(const sonde_environment *env,
   return sonde_controls_clean(&wanted, &plain, 1);
 }
 
-static sonde_status create_parts(sonde_environment *env, sonde_patient *patient,
-                                 sonde_error *error) {
+sonde_status sonde_environment_open(sonde_environment *env, sonde_patient *patient,
+                                    sonde_error *error) {
+  SONDE_ASSERT(env->def && env->probe && patient->setup);
+  env->patient = patient;
   const sonde_case_setup *setup = patient->setup;
   sonde_session_def session = sonde_session_def_default();
   sonde_case_session(setup, &session);
@@ -30,28 +32,24 @@ static sonde_status create_parts(sonde_environment *env, sonde_patient *patient,
   const sonde_session_controls controls = controls_of(env, &patient->start);
   sonde_status status =
       sonde_subject_create(&fixed, setup->model, &session.world, &controls, &env->subject, error);
-  if (status || !env->def->inside) return status;
-  status = sonde_interior_create(setup->model, &env->interior, error);
-  if (!status) status = sonde_interior_set_findings(env->interior, &setup->findings, error);
-  if (status || !env->def->width) return status;
+  const bool inside = env->def->inside, draws = inside && env->def->width > 0;
+  if (!status && inside) status = sonde_interior_create(setup->model, &env->interior, error);
+  if (!status && inside)
+    status = sonde_interior_set_findings(env->interior, &setup->findings, error);
   sonde_echo_def image = sonde_echo_def_default();
   image.scanner = env->def->scanner;
-  return sonde_echo_create(env->interior, &image, &env->echo, error);
-}
+  if (!status && draws) status = sonde_echo_create(env->interior, &image, &env->echo, error);
+  if (status) return status;
 
-sonde_status sonde_environment_open(sonde_environment *env, sonde_patient *patient,
-                                    sonde_error *error) {
-  SONDE_ASSERT(env->def && env->probe && patient->setup);
-  env->patient = patient;
-  sonde_status status = create_parts(env, patient, error);
-  if (!status && !patient->rest) {
+  // The first environment of a patient gives the others their rest.
+  if (!patient->rest) {
     patient->rest_bytes = sonde_subject_size(env->subject);
     patient->rest = sonde_calloc(1, patient->rest_bytes);
     if (!patient->rest) return sonde_fail_memory(error);
     patient->rest_bytes = sonde_subject_remember(env->subject, patient->rest);
     if (env->interior) sonde_interior_remember(env->interior, &patient->inside);
   }
-  return status ? status : sonde_environment_reset(env, &patient->start, error);
+  return sonde_environment_reset(env, &patient->start, error);
 }
 
 void sonde_environment_close(sonde_environment *env) {

@@ -18,16 +18,6 @@ static sonde_vec3 at_most(sonde_vec3 v, double length) {
   return n > length ? v_scale(v, length / n) : v;
 }
 
-// Where a velocity and an angular velocity in the probe's frame take a pose in one tick.
-static sonde_pose moved(sonde_pose pose, sonde_vec3 speed_m_s, sonde_vec3 turn_rad_s, double dt_s) {
-  double angle = v_norm(turn_rad_s) * dt_s;
-  sonde_vec3 axis = v_scale(v_unit(turn_rad_s, vec3(0, 0, 1)), sin(0.5 * angle));
-  sonde_quat turn = {cos(0.5 * angle), axis.x, axis.y, axis.z};
-  pose.position = v_madd(pose.position, dt_s, q_rotate(pose.rotation, speed_m_s));
-  pose.rotation = q_unit(q_mul(pose.rotation, turn));
-  return pose;
-}
-
 void sonde_environment_step(sonde_environment *env, const double *action, uint32_t ticks) {
   const sonde_batch_def *def = env->def;
   const double dt_s = env->subject->dt_s;
@@ -59,7 +49,12 @@ void sonde_environment_step(sonde_environment *env, const double *action, uint32
             clamp(def->admittance_m_s_n * (wanted_n - force_n), -def->speed_m_s, def->speed_m_s);
         speed = at_most(speed, def->speed_m_s);
       }
-      pose = moved(before, speed, turn, dt_s);
+      // Velocity and angular velocity of the probe's frame, for a tick.
+      const double angle = v_norm(turn) * dt_s;
+      const sonde_vec3 by = v_scale(v_unit(turn, vec3(0, 0, 1)), sin(0.5 * angle));
+      pose.position = v_madd(before.position, dt_s, q_rotate(before.rotation, speed));
+      pose.rotation =
+          q_unit(q_mul(before.rotation, (sonde_quat){cos(0.5 * angle), by.x, by.y, by.z}));
     }
     // Above the limit of the force the probe goes back, whatever the action says.
     if (force_n > def->force_limit_n) {
