@@ -243,15 +243,6 @@ static sonde_model_def define_model(const options *a, const fit_inputs *in, char
   return def;
 }
 
-static sonde_status build_model(const options *a, const fit_inputs *in, sonde_model **model,
-                                sonde_error *error) {
-  char provenance[256];
-  const sonde_model_def def = define_model(a, in, provenance);
-  sonde_status status = sonde_model_build(&def, model, error);
-  if (!status && a->body == BODY_OTHER) (*model)->vein.count = (*model)->artery.count = 0;
-  return status;
-}
-
 static sonde_status leave_out(const options *a, const fit_inputs *in, const sonde_model *model,
                               const sonde_fit_def *def, fit_outcome *out, sonde_error *error) {
   sonde_progress progress = app_progress();
@@ -365,7 +356,10 @@ static sonde_status fit_model(const options *a, const fit_inputs *in, fit_outcom
   sonde_fit_result *result = &out->result;
   sonde_fit_def def = a->def;
   sonde_progress progress = app_progress();
-  sonde_status status = build_model(a, in, &model, error);
+  char provenance[256];
+  const sonde_model_def model_def = define_model(a, in, provenance);
+  sonde_status status = sonde_model_build(&model_def, &model, error);
+  if (!status && a->body == BODY_OTHER) model->vein.count = model->artery.count = 0;
 
   // The estimate; the checks behind it need the exponent that it chose.
   if (!status && a->exponent == EXPONENT_AUTO) {

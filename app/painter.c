@@ -186,16 +186,8 @@ static int compare_pieces(const void *a, const void *b) {
   return (x->opacity > y->opacity) - (x->opacity < y->opacity);
 }
 
-static void put_ball(sonde_file *drawing, const piece *ball) {
-  char look[96];
-  double r = (double)ball->width_px;
-  snprintf(look, sizeof look, "fill='#%06x' stroke='#222' stroke-width='.6'", ball->rgb);
-  sonde_svg_put_circle(drawing, ball->xy[0][0], ball->xy[0][1], r, look);
-  sonde_svg_put_circle(drawing, ball->xy[0][0] - 0.3 * r, ball->xy[0][1] - 0.3 * r, 0.32 * r,
-                       "fill='#fff' fill-opacity='.55'");
-}
-
 sonde_status painter_paint(painter *p, sonde_file *drawing, sonde_error *error) {
+  assert(p->pieces || !p->count);
   double least = INFINITY, most = -INFINITY;
   for (uint32_t i = 0; i < p->count; ++i)
     least = fmin(least, p->pieces[i].depth_m), most = fmax(most, p->pieces[i].depth_m);
@@ -210,7 +202,11 @@ sonde_status painter_paint(painter *p, sonde_file *drawing, sonde_error *error) 
     uint32_t corners = 0;
     char look[128];
     if (first->corners == 1) {
-      put_ball(drawing, first);
+      const double r = (double)first->width_px; // a ball with its highlight
+      snprintf(look, sizeof look, "fill='#%06x' stroke='#222' stroke-width='.6'", first->rgb);
+      sonde_svg_put_circle(drawing, first->xy[0][0], first->xy[0][1], r, look);
+      sonde_svg_put_circle(drawing, first->xy[0][0] - 0.3 * r, first->xy[0][1] - 0.3 * r, 0.32 * r,
+                           "fill='#fff' fill-opacity='.55'");
       ++i;
       continue;
     }

@@ -49,21 +49,17 @@ static double *make_dense(const sonde_block_matrix *a) {
   return dense;
 }
 
-// Four sums at a time.
-static double dot(const double *a, const double *b, size_t n) {
-  double sum[4] = {0};
-  size_t k = 0;
-  for (; k + 4 <= n; k += 4)
-    for (size_t c = 0; c < 4; ++c) sum[c] += a[k + c] * b[k + c];
-  for (; k < n; ++k) sum[0] += a[k] * b[k];
-  return sum[0] + sum[1] + sum[2] + sum[3];
-}
-
 // Lower Cholesky factor by rows, in place, then both triangular solutions.
 static void solve_dense(double *l, size_t n, double *x) {
   for (size_t i = 0; i < n; ++i)
     for (size_t j = 0; j <= i; ++j) {
-      double sum = l[i * n + j] - dot(l + i * n, l + j * n, j);
+      const double *a = l + i * n, *b = l + j * n;
+      double part[4] = {0}; // four sums at a time
+      size_t k = 0;
+      for (; k + 4 <= j; k += 4)
+        for (size_t c = 0; c < 4; ++c) part[c] += a[k + c] * b[k + c];
+      for (; k < j; ++k) part[0] += a[k] * b[k];
+      double sum = l[i * n + j] - (part[0] + part[1] + part[2] + part[3]);
       l[i * n + j] = i == j ? sqrt(sum) : sum / l[j * n + j];
     }
   for (size_t i = 0; i < n; ++i) {

@@ -47,11 +47,6 @@ static sonde_status append(const sonde_limb *limb, const sonde_mesh *from, sonde
   return SONDE_OK;
 }
 
-// A point of the straight limb where the model holds it.
-static sonde_vec3 held_point(const limb_held *held, sonde_vec3 p) {
-  return sonde_limb_to_model(held->limb, held->pose ? sonde_limb_pose_point(held->pose, p) : p);
-}
-
 // Middles of the bones that carry the body: hip joint, neck, shaft, knee, tibia.
 static sonde_status lay_axis(const limb_held *held, sonde_model *model, sonde_error *error) {
   const sonde_limb *limb = held->limb;
@@ -77,7 +72,10 @@ static sonde_status lay_axis(const limb_held *held, sonde_model *model, sonde_er
       before = now;
     }
   }
-  for (uint32_t k = 0; k < POINTS; ++k) p[k] = v_whole_nm(held_point(held, p[k]));
+  for (uint32_t k = 0; k < POINTS; ++k) { // where the model holds the straight limb's points
+    if (held->pose) p[k] = sonde_limb_pose_point(held->pose, p[k]);
+    p[k] = v_whole_nm(sonde_limb_to_model(held->limb, p[k]));
+  }
   return SONDE_OK;
 }
 

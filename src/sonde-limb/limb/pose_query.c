@@ -6,11 +6,6 @@
 
 #include <string.h>
 
-static bool is_popliteal(const struct limb_vessels *v, uint32_t b) {
-  return v->branch[b].kind == SONDE_LIMB_DEEP_VEIN &&
-         strstr(v->branch[b].name, "popliteal vein") != NULL;
-}
-
 sonde_vec3 sonde_limb_pose_point(const sonde_limb_pose *pose, sonde_vec3 rest_m) {
   SONDE_ASSERT(pose);
   return limb_side_point(pose->limb, limb_pose_forward(pose, limb_side_point(pose->limb, rest_m)));
@@ -67,7 +62,8 @@ sonde_vec3 limb_pose_groin(const sonde_limb_pose *pose) {
 
 // A straight knee narrows the popliteal vein from 7.7 to 4.3 mm; 20 degrees free it.
 double limb_pose_knee(const sonde_limb_pose *pose, uint32_t vessel, sonde_vec3 rest) {
-  if (!is_popliteal(pose->limb->vessels, vessel)) return 1;
+  const vessel_branch *branch = &pose->limb->vessels->branch[vessel];
+  if (branch->kind != SONDE_LIMB_DEEP_VEIN || !strstr(branch->name, "popliteal vein")) return 1;
   double u = clamp(1 - pose->knee_angle / (20 * DEGREE), 0, 1);
   double beside = clamp((fabs(limb_level(pose->limb, rest.z) - 0.97) - 0.1) / 0.08, 0, 1);
   return 1 - (1 - 4.3 / 7.7) * u * u * (3 - 2 * u) * (1 - beside * beside * (3 - 2 * beside));

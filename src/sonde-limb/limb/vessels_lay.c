@@ -292,14 +292,12 @@ void limb_vessels_lay_deep_femoral(struct limb_vessels *v) {
   add_through(v, spec, knot, 3);
 }
 
-void limb_vessels_lay_veins(struct limb_vessels *v) {
-  const sonde_limb *limb = v->limb;
-  const vessel_draws *d = &v->draws;
-  // Greatest radius of the popliteal vein: between the knee's bones and the fascia stand also the
-  // artery, the tibial nerve and what keeps them apart. A straight knee narrows the vein of a lean
-  // leg.
-  double *r = v->draws.radius, least = INFINITY;
-  const double others = BONE_GAP + 2 * (r[DIA_POPA] + ARTERY_WALL) + WALL_GAP + 2 * VEIN_WALL +
+// Greatest radius of the popliteal vein: between the knee's bones and the fascia stand also the
+// artery, the tibial nerve and what keeps them apart. A straight knee narrows the vein of a lean
+// leg.
+static double popliteal_room(const sonde_limb *limb, double artery_m) {
+  double least = INFINITY;
+  const double others = BONE_GAP + 2 * (artery_m + ARTERY_WALL) + WALL_GAP + 2 * VEIN_WALL +
                         0.0068; // 4.5 mm of nerve, 2.3 mm around it
   for (double level = 0.9; level < 1.06; level += 0.02) {
     double depth = 0.004, radius = limb_fascia_radius(limb, level, SONDE_PI);
@@ -310,7 +308,14 @@ void limb_vessels_lay_veins(struct limb_vessels *v) {
     }
     least = fmin(least, depth);
   }
-  const double room = fmax(0.5 * (least - others), 0.0018);
+  return fmax(0.5 * (least - others), 0.0018);
+}
+
+void limb_vessels_lay_veins(struct limb_vessels *v) {
+  const sonde_limb *limb = v->limb;
+  const vessel_draws *d = &v->draws;
+  double *r = v->draws.radius;
+  const double room = popliteal_room(limb, r[DIA_POPA]);
   r[DIA_POPV] = fmin(r[DIA_POPV], room), r[DIA_TPV] = fmin(r[DIA_TPV], 0.95 * r[DIA_POPV]);
   double hiatus = limb_z(limb, d->hiatus), split = limb_z(limb, fmin(1.13, d->trunk_end - 0.004));
   // Above the saphenofemoral junction the common femoral vein has its table's width. Below, and in

@@ -90,16 +90,6 @@ sonde_motion sonde_cast_way(const sonde_scene_state *state, uint32_t b, double h
                         sonde_spin_between(from, state->now.rotation[b], h)};
 }
 
-// As the velocities at the start of the step announce it.
-static sonde_motion planned_way(const sonde_scene_state *state, uint32_t b, double h) {
-  const sonde_body *body = &state->scene->bodies[b];
-  uint32_t s = body->first_slot;
-  bool falls = body->motion == SONDE_BODY_FREE;
-  return (sonde_motion){{state->now.position[s], state->now.rotation[b]},
-                        v_madd(state->now.velocity[s], falls ? h : 0, state->scene->gravity_m_s2),
-                        state->now.velocity[s + 1]};
-}
-
 // Share of a step after which the boxes of a pair meet.
 static double boxes_meet(sonde_scene_state *state, const sonde_scene_motion *from, uint32_t t,
                          sonde_vec3 p, sonde_vec3 q) {
@@ -135,8 +125,18 @@ static double share_of(sonde_scene_state *state, uint32_t t, const sonde_scene_m
   if (apart < 1 && sonde_body_is_convex(a) && sonde_body_is_convex(b)) {
     sonde_motion way[2];
     const uint32_t both[2] = {touch->a, touch->b};
-    for (int s = 0; s < 2; ++s)
-      way[s] = planned ? planned_way(state, both[s], h) : sonde_cast_way(state, both[s], h);
+    for (int s = 0; s < 2; ++s) {
+      way[s] = sonde_cast_way(state, both[s], h);
+      if (!planned) continue;
+      // As the velocities at the start of the step announce it.
+      const sonde_body *body = &state->scene->bodies[both[s]];
+      const uint32_t slot = body->first_slot;
+      const bool falls = body->motion == SONDE_BODY_FREE;
+      way[s] = (sonde_motion){
+          {state->now.position[slot], state->now.rotation[both[s]]},
+          v_madd(state->now.velocity[slot], falls ? h : 0, state->scene->gravity_m_s2),
+          state->now.velocity[slot + 1]};
+    }
     sonde_cast_result met =
         sonde_convex_cast(&a->convex, &way[0], &b->convex, &way[1], h, MARGIN * thickness);
     apart = met.hit ? met.time_s / h : 1;

@@ -134,18 +134,6 @@ sonde_status sonde_echo_point_widths(const sonde_echo_view *view, double depth_m
   return status;
 }
 
-// Envelope a fraction of a sample further, 0 < fraction < 1, from a windowed sinc of the intensity.
-static double moved_back(const float *image, uint32_t stride, uint32_t s, uint32_t l,
-                         double fraction) {
-  double sum = 0;
-  for (int k = 1 - SINC; k <= SINC; ++k) {
-    double x = fraction - k, v = (double)image[(size_t)((int64_t)s + k) * stride + l];
-    double taper = cos(0.5 * SONDE_PI * x / SINC);
-    sum += v * v * sin(SONDE_PI * x) / (SONDE_PI * x) * taper * taper;
-  }
-  return sqrt(fmax(sum, 0));
-}
-
 sonde_status sonde_echo_flicker(const sonde_echo_view *view, double depth_m, uint32_t count,
                                 uint64_t seed, double *flicker, sonde_error *error) {
   SONDE_ASSERT(view != NULL && flicker != NULL && count > 0);
@@ -167,7 +155,15 @@ sonde_status sonde_echo_flicker(const sonde_echo_view *view, double depth_m, uin
       for (uint32_t s = w.samples[0]; s <= w.samples[1]; ++s)
         for (uint32_t l = w.lines[0]; l <= w.lines[1]; ++l) {
           double before = (double)still[(size_t)s * lines + l];
-          double off = moved_back(image, lines, s, l, (double)k / FRACTIONS) - before;
+          // Envelope k / FRACTIONS of a sample further, from a windowed sinc of the intensity.
+          double sum = 0;
+          for (int j = 1 - SINC; j <= SINC; ++j) {
+            double x = (double)k / FRACTIONS - j;
+            double v = (double)image[(size_t)((int64_t)s + j) * lines + l];
+            double taper = cos(0.5 * SONDE_PI * x / SINC);
+            sum += v * v * sin(SONDE_PI * x) / (SONDE_PI * x) * taper * taper;
+          }
+          double off = sqrt(fmax(sum, 0)) - before;
           change += off * off, size += before * before;
         }
     }

@@ -15,19 +15,6 @@ static double stored(const sonde_render *render) {
          0.5 * def->force_scale * def->probe_mass_kg * v_norm2(render->probe_m_s);
 }
 
-// A spring K held over a tick of length T generates K |v T|^2 / 2 at a steady velocity. A damper
-// `a` dissipates a |v|^2 T. The controller adds just what the surplus does not cover:
-//   a = (K T^2 |v|^2 / 2 - surplus) / (T |v|^2), 0 <= a <= controller_max.
-// With an empty reserve and a steady hand that is Colgate's K T / 2.
-static double needed_damping(const sonde_render *render) {
-  const sonde_render_def *def = &render->def;
-  if (!def->controller) return 0.0;
-  double h = def->dt_s, v2 = v_norm2(render->velocity_m_s);
-  double need = 0.5 * def->stiffness_n_m * h * h * v2 - render->surplus_j;
-  if (need <= 0.0) return 0.0;
-  return need < def->controller_max_n_s_m * h * v2 ? need / (h * v2) : def->controller_max_n_s_m;
-}
-
 sonde_pose sonde_render_probe(sonde_render *render, sonde_pose world_from_device,
                               sonde_vec3 tissue_force_n, sonde_vec3 rendered_force_n) {
   const sonde_render_def *def = &render->def;
@@ -72,7 +59,15 @@ sonde_pose sonde_render_probe(sonde_render *render, sonde_pose world_from_device
   render->probe_m = v_add(render->probe_m, render->probe_moved_m);
   sonde_vec3 stretch = v_sub(render->probe_m, render->device_m);
   sonde_vec3 slip = v_sub(render->probe_m_s, render->velocity_m_s);
-  render->damping_n_s_m = needed_damping(render);
+  // A spring K held over a tick of length T generates K |v T|^2 / 2 at a steady velocity. A damper
+  // `a` dissipates a |v|^2 T. The controller adds just what the surplus does not cover:
+  //   a = (K T^2 |v|^2 / 2 - surplus) / (T |v|^2), 0 <= a <= controller_max.
+  // With an empty reserve and a steady hand that is Colgate's K T / 2.
+  const double v2 = v_norm2(render->velocity_m_s), most = def->controller_max_n_s_m;
+  const double need = 0.5 * def->stiffness_n_m * h * h * v2 - render->surplus_j;
+  render->damping_n_s_m = !def->controller || need <= 0.0 ? 0.0
+                          : need < most * h * v2          ? need / (h * v2)
+                                                          : most;
   if (render->damping_n_s_m > 0.0) render->controlled_ticks++;
   render->controlled_j += render->damping_n_s_m * v_norm2(render->velocity_m_s) * def->dt_s;
   render->force_n = v_madd(v_scale(stretch, def->stiffness_n_m), def->damping_n_s_m, slip);

@@ -84,15 +84,6 @@ enum {
   UPDATED_PER_BATCH = 29
 };
 
-static void count_bytes(sonde_batches *body, uint64_t sweeps, uint64_t iterations) {
-  uint64_t batches = body->awake_count, slots = body->slot_total;
-  uint64_t evaluated = EVALUATED_PER_BATCH * batches + body->tissue->evaluated_per_slot * slots;
-  uint64_t multiplied = body->tissue->multiplied_per_slot * slots;
-  body->common.bytes_moved +=
-      sizeof(reals) * (evaluated + sweeps * (SWEPT_PER_BATCH * batches + multiplied) +
-                       iterations * (ITERATED_PER_BATCH * batches + multiplied));
-}
-
 // From r and z, whose products are r.z and r.r. They begin at x = 0 when no sweep went before: each
 // of their steps then is one downhill, however early they end, while a first sweep may overshoot
 // where springs are stiff.
@@ -179,7 +170,13 @@ static bool solve(sonde_state *state, sonde_batches *body, iteration *now, bool 
   }
   result.converged = result.residual <= target || now->postponed;
   if (!result.converged) state->flags |= SONDE_FLAG_NOT_CONVERGED;
-  count_bytes(body, sweeps, result.iterations - sweeps);
+  const uint64_t batches = body->awake_count, slots = body->slot_total;
+  const uint64_t evaluated =
+      EVALUATED_PER_BATCH * batches + body->tissue->evaluated_per_slot * slots;
+  const uint64_t multiplied = body->tissue->multiplied_per_slot * slots;
+  body->common.bytes_moved +=
+      sizeof(reals) * (evaluated + sweeps * (SWEPT_PER_BATCH * batches + multiplied) +
+                       (result.iterations - sweeps) * (ITERATED_PER_BATCH * batches + multiplied));
   result.iterations += state->solver.iterations;
   state->solver = result;
   return solved;
@@ -254,14 +251,6 @@ static void evaluate_at_rest(sonde_batches *body) {
   }
 }
 
-// The solution of that as a change of the velocities of the start.
-static void count_from_start(sonde_batches *body) {
-  for (uint32_t a = 0; a < body->awake_count; ++a) {
-    sonde_batch *at = &body->batch[body->awake[a]];
-    for (int c = 0; c < 3; ++c) at->x[c] -= at->v[c], at->ve[c] = at->v[c];
-  }
-}
-
 // One Newton iteration: contact, forces and matrix where the nodes are expected, solution, pushes
 // after it. True when another one is needed; `last`: there will be none. Sweeps need a first
 // iteration without corner couplings.
@@ -301,7 +290,11 @@ static bool iterate(sonde_state *state, sonde_batches *body, const sonde_probe *
     assembled = sonde_clock_now();
     solved = solve(state, body, now, sweep, sums, sqrt(now->force2));
   }
-  if (is_equation_4(state)) count_from_start(body);
+  // The solution of eq. (4) as a change of the velocities of the start.
+  for (uint32_t a = 0; is_equation_4(state) && a < body->awake_count; ++a) {
+    sonde_batch *at = &body->batch[body->awake[a]];
+    for (int c = 0; c < 3; ++c) at->x[c] -= at->v[c], at->ve[c] = at->v[c];
+  }
   double end = sonde_clock_now();
 
   bool open = solved && !last;

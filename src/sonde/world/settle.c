@@ -64,23 +64,19 @@ static void move(const problem *p, double share) {
   }
 }
 
-// r.d over the free nodes, d the way from the base: with F there minus the slope of the energy.
-static double work(const problem *p) {
-  wide_sum sum = {0};
-  for (uint32_t s = 0; s < p->body->common.batch_count; ++s) {
-    const sonde_batch *base = &p->body->base[s], *at = &p->body->batch[s];
-    for (int c = 0; c < 3; ++c) sum += at->r[c] * (at->u[c] - base->u[c]);
-  }
-  return total(sum);
-}
-
 // Shortens the step until the energy does not rise at its end by more than it fell at its start:
 // F.d there may be negative, but not larger than half of what it was. Secant on F.d.
 static bool line_search(const problem *p, double share, double first_slope, balance *now) {
   for (int tries = 0; tries < 8; ++tries) {
     move(p, share);
     balance next = evaluate(p);
-    double end = work(p) / share;
+    // r.d over the free nodes, d the way from the base: with F there minus the slope of the energy.
+    wide_sum sum = {0};
+    for (uint32_t s = 0; s < p->body->common.batch_count; ++s) {
+      const sonde_batch *base = &p->body->base[s], *at = &p->body->batch[s];
+      for (int c = 0; c < 3; ++c) sum += at->r[c] * (at->u[c] - base->u[c]);
+    }
+    double end = total(sum) / share;
     if (isfinite(next.residual) &&
         (end >= -0.5 * first_slope || next.residual < 0.5 * now->residual)) {
       *now = next;
