@@ -293,7 +293,7 @@ static void pressures_follow_the_clock(void **state) {
   sonde_pathology p;
   assert_int_equal(sonde_pathology_preset("healthy", &p, NULL), SONDE_OK);
   sonde_circulation_apply(&c, 12000, 1e-3, &p);
-  assert_true(p.venous_pressure_pa > 60 * SONDE_PA_PER_MMHG - 1);
+  assert_true(p.venous_pressure_pa > 52 * SONDE_PA_PER_MMHG - 1); // standing and straining
   // Stiffer walls give way less to the pressure that fills them.
   assert_true(sonde_vein_tube_pressure(1.3, 60e3) > sonde_vein_tube_pressure(1.3, 15e3) + 500);
 }
