@@ -139,7 +139,7 @@ class Package(unittest.TestCase):
     def test_examples_run(self):
         import many_legs
         import press
-        rows = press.main(depths_mm=(4, 12))
+        rows = press.main(depths_mm=(3, 6))
         self.assertTrue(rows[1][1] > rows[0][1] > 0 and rows[1][2] < rows[0][2])
         closes = many_legs.main([leg], steps=50, most_n=12)
         self.assertTrue(4 < closes[0] < 10)
