@@ -124,22 +124,17 @@ sonde_status sonde_batch_create(const sonde_batch_def *def, sonde_batch **out, s
   if (status) return status;
   if (!def->patients || !def->patient_count)
     return sonde_fail(error, SONDE_ARGUMENT, "batch: no patients");
-  const struct {
-    const char *name;
-    double value, low, high;
-  } ranges[] = {{"count", def->count, 1, MOST_ENVIRONMENTS},
-                {"ticks_per_step", def->ticks_per_step, 1, 1000},
-                {"drive", (double)def->drive, 0, SONDE_BATCH_DRIVES - 1},
-                {"width", def->width ? def->width : 16, 16, 4096},
-                {"height", def->width ? def->height : 16, 16, 4096},
-                {"speed_m_s", def->speed_m_s, 1e-3, 2},
-                {"speed_rad_s", def->speed_rad_s, 1e-3, 20},
-                {"force_limit_n", def->force_limit_n, 0.1, 200},
-                {"admittance_m_s_n", def->admittance_m_s_n, 1e-4, 0.1}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(ranges); ++k)
-    if (!(ranges[k].value >= ranges[k].low && ranges[k].value <= ranges[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "batch: %s %g, expected %g to %g", ranges[k].name,
-                        ranges[k].value, ranges[k].low, ranges[k].high);
+  const sonde_bounded ranges[] = {{"count", def->count, 1, MOST_ENVIRONMENTS},
+                                  {"ticks_per_step", def->ticks_per_step, 1, 1000},
+                                  {"drive", (double)def->drive, 0, SONDE_BATCH_DRIVES - 1},
+                                  {"width", def->width ? def->width : 16, 16, 4096},
+                                  {"height", def->width ? def->height : 16, 16, 4096},
+                                  {"speed_m_s", def->speed_m_s, 1e-3, 2},
+                                  {"speed_rad_s", def->speed_rad_s, 1e-3, 20},
+                                  {"force_limit_n", def->force_limit_n, 0.1, 200},
+                                  {"admittance_m_s_n", def->admittance_m_s_n, 1e-4, 0.1}};
+  status = sonde_bounded_check(ranges, SONDE_COUNT_OF(ranges), error);
+  if (status) return status;
   if (def->width && !def->inside)
     return sonde_fail(error, SONDE_ARGUMENT, "batch: pictures need `inside`");
   for (uint32_t k = 0; k < def->patient_count; ++k)

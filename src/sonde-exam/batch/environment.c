@@ -60,22 +60,16 @@ void sonde_environment_close(sonde_environment *env) {
 
 sonde_status sonde_environment_reset(sonde_environment *env, const sonde_batch_start *start,
                                      sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } scales[] = {{"stiffness_scale", start->stiffness_scale, 0.5, 2},
-                {"damping_scale", start->damping_scale, 0.25, 4},
-                {"friction_scale", start->friction_scale, 0, 2}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(scales); ++k)
-    if (!(scales[k].value >= scales[k].low && scales[k].value <= scales[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "start: %s %g, expected %g to %g", scales[k].name,
-                        scales[k].value, scales[k].low, scales[k].high);
+  const sonde_bounded scales[] = {{"stiffness_scale", start->stiffness_scale, 0.5, 2},
+                                  {"damping_scale", start->damping_scale, 0.25, 4},
+                                  {"friction_scale", start->friction_scale, 0, 2}};
+  sonde_status status = sonde_bounded_check(scales, SONDE_COUNT_OF(scales), error);
+  if (status) return status;
   if (!sonde_pose_usable(start->world_from_probe))
     return sonde_fail(error, SONDE_ARGUMENT,
                       "start: a pose that is none, expected metres and a quaternion");
   const sonde_patient *patient = env->patient;
-  sonde_status status =
-      sonde_subject_recall(env->subject, patient->rest, patient->rest_bytes, error);
+  status = sonde_subject_recall(env->subject, patient->rest, patient->rest_bytes, error);
   if (!status && env->interior)
     status = sonde_interior_recall(env->interior, &patient->inside, error);
   if (status) return status;

@@ -145,21 +145,16 @@ sonde_status sonde_protocol_run(const sonde_model *model, const sonde_world_def 
                                   .synthetic = true};
   snprintf(record->probe, sizeof record->probe, "%s", protocol->probe);
   sonde_status status = SONDE_OK;
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"depth_m", protocol->depth_m, 1e-4, DEEPEST_M},
-               {"force_n", protocol->force_n, 0, 200},
-               {"speed_count", protocol->speed_count, 1, SONDE_PROTOCOL_SPEEDS},
-               {"hold_s", protocol->hold_s, 0.02, 60},
-               {"slide_m", protocol->slide_m, 1e-3, 0.1},
-               {"rate_hz", protocol->rate_hz, 50, 1 / world.dt_s + 1e-6},
-               {"noise_force_n", protocol->noise_force_n, 0, 100},
-               {"noise_position_m", protocol->noise_position_m, 0, 0.01}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
+  const sonde_bounded range[] = {{"depth_m", protocol->depth_m, 1e-4, DEEPEST_M},
+                                 {"force_n", protocol->force_n, 0, 200},
+                                 {"speed_count", protocol->speed_count, 1, SONDE_PROTOCOL_SPEEDS},
+                                 {"hold_s", protocol->hold_s, 0.02, 60},
+                                 {"slide_m", protocol->slide_m, 1e-3, 0.1},
+                                 {"rate_hz", protocol->rate_hz, 50, 1 / world.dt_s + 1e-6},
+                                 {"noise_force_n", protocol->noise_force_n, 0, 100},
+                                 {"noise_position_m", protocol->noise_position_m, 0, 0.01}};
+  status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  if (status) return status;
   for (uint32_t k = 0; k < protocol->speed_count; ++k)
     if (!(protocol->speed_m_s[k] >= 1e-3 && protocol->speed_m_s[k] <= 1))
       return sonde_fail(error, SONDE_ARGUMENT, "speed %g m/s, expected 0.001 to 1",

@@ -163,25 +163,21 @@ sonde_status sonde_robot_run(const sonde_model *model, const sonde_site_table *s
                              sonde_error *error) {
   *measurements = (sonde_measurements){0};
   if (log) *log = (sonde_robot_log){0};
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"step_m", def->step_m, 1e-5, 0.1},
-               {"limit_n", def->limit_n, 0, 1e4},
-               {"depth_limit_m", def->depth_limit_m, def->step_m, 0.2},
-               {"noise_force_n", def->noise_force_n, 0, 1e3},
-               {"noise_penetration_m", def->noise_penetration_m, 0, 0.1},
-               {"quantum_force_n", def->quantum_force_n, 0, 1e3},
-               {"quantum_penetration_m", def->quantum_penetration_m, 0, def->step_m},
-               {"relative_residual", def->relative_residual, 1e-14, 0.1},
-               {"max_iterations", def->max_iterations, 1, 1e6}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
+  const sonde_bounded range[] = {
+      {"step_m", def->step_m, 1e-5, 0.1},
+      {"limit_n", def->limit_n, 0, 1e4},
+      {"depth_limit_m", def->depth_limit_m, def->step_m, 0.2},
+      {"noise_force_n", def->noise_force_n, 0, 1e3},
+      {"noise_penetration_m", def->noise_penetration_m, 0, 0.1},
+      {"quantum_force_n", def->quantum_force_n, 0, 1e3},
+      {"quantum_penetration_m", def->quantum_penetration_m, 0, def->step_m},
+      {"relative_residual", def->relative_residual, 1e-14, 0.1},
+      {"max_iterations", def->max_iterations, 1, 1e6}};
+  sonde_status status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  if (status) return status;
   if (def->depth_limit_m / def->step_m > MAX_STEPS)
     return sonde_fail(error, SONDE_ARGUMENT, "more than %d steps per site", MAX_STEPS);
-  sonde_status status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
+  status = sonde_sites_check_on_surface(model, sites, SONDE_SITE_TOLERANCE_M, error);
   if (status) return status;
   robot r = {.model = model, .sites = sites, .def = def};
   uint32_t workers = sonde_parallel_workers(def->threads, sites->count);

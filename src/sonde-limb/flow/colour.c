@@ -40,22 +40,17 @@ double sonde_colour_limit(const sonde_colour_def *def) {
 sonde_status sonde_colour_create(const sonde_colour_def *def, sonde_colour **out,
                                  sonde_error *error) {
   SONDE_ASSERT(def && out);
-  const struct {
-    const char *name;
-    double value, least, most;
-  } LIMIT[] = {{"frequency", def->frequency_hz, 1e6, 2e7},
-               {"pulse repetition", def->pulse_hz, 100, 2e4},
-               {"packet", def->packet, 4, COLOUR_PACKET},
-               {"filter order", def->filter_order, 0, COLOUR_ORDER},
-               {"beam", def->beam_m, 0.1e-3, 5e-3},
-               {"noise", def->noise_db, -100, 40},
-               {"clutter", def->clutter_db, -100, 80},
-               {"persistence", def->persistence, 0, 0.95}};
+  const sonde_bounded LIMIT[] = {{"frequency", def->frequency_hz, 1e6, 2e7},
+                                 {"pulse repetition", def->pulse_hz, 100, 2e4},
+                                 {"packet", def->packet, 4, COLOUR_PACKET},
+                                 {"filter order", def->filter_order, 0, COLOUR_ORDER},
+                                 {"beam", def->beam_m, 0.1e-3, 5e-3},
+                                 {"noise", def->noise_db, -100, 40},
+                                 {"clutter", def->clutter_db, -100, 80},
+                                 {"persistence", def->persistence, 0, 0.95}};
   *out = NULL;
-  for (size_t k = 0; k < SONDE_COUNT_OF(LIMIT); ++k)
-    if (!(LIMIT[k].value >= LIMIT[k].least && LIMIT[k].value <= LIMIT[k].most))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", LIMIT[k].name,
-                        LIMIT[k].value, LIMIT[k].least, LIMIT[k].most);
+  sonde_status status = sonde_bounded_check(LIMIT, SONDE_COUNT_OF(LIMIT), error);
+  if (status) return status;
   sonde_colour *c = SONDE_NEW(sonde_colour, 1);
   if (!c) return sonde_fail_memory(error);
   c->def = *def;

@@ -78,22 +78,17 @@ double sonde_doppler_truth(const sonde_doppler *d, const double profile_m_s[SOND
 sonde_status sonde_doppler_create(const sonde_doppler_def *def, sonde_doppler **out,
                                   sonde_error *error) {
   SONDE_ASSERT(def && out);
-  const struct {
-    const char *name;
-    double value, least, most;
-  } LIMIT[] = {{"frequency", def->frequency_hz, 1e6, 2e7},
-               {"pulse repetition", def->pulse_hz, 500, 2e4},
-               {"angle", def->angle_rad, 0, SONDE_PI},
-               {"gate", def->gate_m, 0.2e-3, 0.05},
-               {"beam", def->beam_m, 0.1e-3, 5e-3},
-               {"lumen's short half axis", def->half_short_m, 0.2e-3, 0.03},
-               {"lumen's long half axis", def->half_long_m, 0.2e-3, 0.03},
-               {"filter", def->filter_hz, 0, def->pulse_hz / 4}};
+  const sonde_bounded LIMIT[] = {{"frequency", def->frequency_hz, 1e6, 2e7},
+                                 {"pulse repetition", def->pulse_hz, 500, 2e4},
+                                 {"angle", def->angle_rad, 0, SONDE_PI},
+                                 {"gate", def->gate_m, 0.2e-3, 0.05},
+                                 {"beam", def->beam_m, 0.1e-3, 5e-3},
+                                 {"lumen's short half axis", def->half_short_m, 0.2e-3, 0.03},
+                                 {"lumen's long half axis", def->half_long_m, 0.2e-3, 0.03},
+                                 {"filter", def->filter_hz, 0, def->pulse_hz / 4}};
   *out = NULL;
-  for (size_t k = 0; k < SONDE_COUNT_OF(LIMIT); ++k)
-    if (!(LIMIT[k].value >= LIMIT[k].least && LIMIT[k].value <= LIMIT[k].most))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", LIMIT[k].name,
-                        LIMIT[k].value, LIMIT[k].least, LIMIT[k].most);
+  sonde_status status = sonde_bounded_check(LIMIT, SONDE_COUNT_OF(LIMIT), error);
+  if (status) return status;
   if (fabs(cos(def->angle_rad)) < 0.05)
     return sonde_fail(
         error, SONDE_ARGUMENT,

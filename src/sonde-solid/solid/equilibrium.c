@@ -40,18 +40,13 @@ static sonde_status check(const sonde_equilibrium_def *def, sonde_error *error) 
                           "(Fung)",
                           NAMES[k], m->shear_pa, m->exponent, m->bulk_pa);
   }
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"rounding_m", def->rounding_m, 0, 0.05},
-               {"contact_n_m3", def->contact_n_m3, least_contact_n_m3, most_contact_n_m3},
-               {"zone_m", def->zone_m, 1e-3, 0.2},
-               {"step_m", def->step_m, 1e-5, 0.1},
-               {"tolerance", def->tolerance, 1e-12, 1e-2}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range) && !status; ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      status = sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                          range[k].value, range[k].low, range[k].high);
+  const sonde_bounded range[] = {
+      {"rounding_m", def->rounding_m, 0, 0.05},
+      {"contact_n_m3", def->contact_n_m3, least_contact_n_m3, most_contact_n_m3},
+      {"zone_m", def->zone_m, 1e-3, 0.2},
+      {"step_m", def->step_m, 1e-5, 0.1},
+      {"tolerance", def->tolerance, 1e-12, 1e-2}};
+  if (!status) status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
   return status;
 }
 

@@ -20,22 +20,15 @@ sonde_status sonde_hexes_check(const sonde_hexes_def *def, sonde_error *error) {
   SONDE_ASSERT(def != NULL);
   sonde_status status = sonde_def_check("a mesh", def->version, error);
   if (status) return status;
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"half_u_m", def->half_u_m, 1e-4, 0.2},
-               {"half_v_m", def->half_v_m, 1e-4, 0.2},
-               {"edge_m", def->edge_m, 1e-4, 0.05},
-               {"growth", def->growth, 1.05, 3},
-               {"reach_m", def->reach_m, 0.01, 2},
-               {"muscle", def->muscle, 1, 20},
-               {"fat", def->fat, 0, 20},
-               {"skin", def->skin, 0, 8}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
-  return SONDE_OK;
+  const sonde_bounded range[] = {{"half_u_m", def->half_u_m, 1e-4, 0.2},
+                                 {"half_v_m", def->half_v_m, 1e-4, 0.2},
+                                 {"edge_m", def->edge_m, 1e-4, 0.05},
+                                 {"growth", def->growth, 1.05, 3},
+                                 {"reach_m", def->reach_m, 0.01, 2},
+                                 {"muscle", def->muscle, 1, 20},
+                                 {"fat", def->fat, 0, 20},
+                                 {"skin", def->skin, 0, 8}};
+  return sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
 }
 
 sonde_status sonde_lines_make(const sonde_hexes_def *def, double half, double down, double up,

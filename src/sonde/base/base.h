@@ -48,6 +48,16 @@ SONDE_LINK sonde_status sonde_fail_at(sonde_error *error, sonde_status status, c
 #define sonde_fail_memory(error)                                                                   \
   sonde_fail_at((error), SONDE_MEMORY, __func__, "out of memory in %s", __func__)
 
+// A number of a definition with the range that it has to lie in, bounds included.
+typedef struct sonde_bounded {
+  const char *name;
+  double value, low, high;
+} sonde_bounded;
+// @return ARGUMENT "<name> is <value>, expected <low> to <high>" for the first of `count` numbers
+// that is not within its range, or no number at all
+SONDE_LINK sonde_status sonde_bounded_check(const sonde_bounded *numbers, size_t count,
+                                            sonde_error *error);
+
 // Whether an option struct has the version of this library.
 // @return SONDE_ARGUMENT naming what was to be made
 SONDE_LINK sonde_status sonde_def_check(const char *what, uint32_t version, sonde_error *error);

@@ -39,25 +39,21 @@ sonde_model_def sonde_model_def_default(void) {
 }
 
 static sonde_status check_law(const sonde_surface_law *law, sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"edge_stiffness_n_m", law->edge_stiffness_n_m, 0, 1e7},
-               {"edge_damping_s", law->edge_damping_s, 0, 10},
-               {"edge_compression", law->edge_compression, 0, 1},
-               {"edge_pretension_n", law->edge_pretension_n, 0, 1e3},
-               {"tangential_stiffness_n_m3", law->tangential_stiffness_n_m3, 0, 1e10},
-               {"inplane_stiffness_n_m", law->inplane_stiffness_n_m, 0, 1e7},
-               {"shear_stiffness_n_m", law->shear_stiffness_n_m, 0, 1e7},
-               {"shear_limit", law->shear_limit, 1e-3, 1e3},
-               {"normal_damping_s", law->normal_damping_s, 0, 100},
-               {"surface_density_kg_m2", law->surface_density_kg_m2, 1e-3, 1e4},
-               {"normal_exponent", law->normal_exponent, 1, 3},
-               {"guard", law->guard, 0.5, 0.99999}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
+  const sonde_bounded range[] = {
+      {"edge_stiffness_n_m", law->edge_stiffness_n_m, 0, 1e7},
+      {"edge_damping_s", law->edge_damping_s, 0, 10},
+      {"edge_compression", law->edge_compression, 0, 1},
+      {"edge_pretension_n", law->edge_pretension_n, 0, 1e3},
+      {"tangential_stiffness_n_m3", law->tangential_stiffness_n_m3, 0, 1e10},
+      {"inplane_stiffness_n_m", law->inplane_stiffness_n_m, 0, 1e7},
+      {"shear_stiffness_n_m", law->shear_stiffness_n_m, 0, 1e7},
+      {"shear_limit", law->shear_limit, 1e-3, 1e3},
+      {"normal_damping_s", law->normal_damping_s, 0, 100},
+      {"surface_density_kg_m2", law->surface_density_kg_m2, 1e-3, 1e4},
+      {"normal_exponent", law->normal_exponent, 1, 3},
+      {"guard", law->guard, 0.5, 0.99999}};
+  sonde_status status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  if (status) return status;
   if (law->normal_exponent != floor(law->normal_exponent))
     return sonde_fail(error, SONDE_ARGUMENT, "normal_exponent is %g, expected 1, 2 or 3",
                       law->normal_exponent);

@@ -147,20 +147,13 @@ static bool follow(path *p, const sonde_progress *progress) {
 static sonde_status check_def(const sonde_path_def *d, sonde_error *error) {
   sonde_status status = sonde_def_check("path", d->version, error);
   if (status) return status;
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"step_m", d->step_m, 1e-6, 0.1},
-               {"least_step_m", d->least_step_m, 1e-7, d->step_m},
-               {"tolerance", d->tolerance, 1e-6, 1},
-               {"force_n", d->force_n, 1e-6, INFINITY},
-               {"relative_residual", d->relative_residual, 1e-14, 0.1},
-               {"max_iterations", d->max_iterations, 1, 1e6}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
-  return SONDE_OK;
+  const sonde_bounded range[] = {{"step_m", d->step_m, 1e-6, 0.1},
+                                 {"least_step_m", d->least_step_m, 1e-7, d->step_m},
+                                 {"tolerance", d->tolerance, 1e-6, 1},
+                                 {"force_n", d->force_n, 1e-6, INFINITY},
+                                 {"relative_residual", d->relative_residual, 1e-14, 0.1},
+                                 {"max_iterations", d->max_iterations, 1, 1e6}};
+  return sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
 }
 
 sonde_path_def sonde_path_def_default(void) {

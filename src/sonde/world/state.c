@@ -23,44 +23,32 @@ sonde_world_def sonde_world_def_default(void) {
 }
 
 static sonde_status check_friction(const sonde_friction *f, sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"friction.mu_static", f->mu_static, 0, 5},
-               {"friction.mu_kinetic", f->mu_kinetic, 0, f->mu_static},
-               {"friction.stribeck_speed_m_s", f->stribeck_speed_m_s, 1e-5, 10},
-               {"friction.gel_film", f->gel_film, 0, 100},
-               {"friction.mu_gel", f->mu_gel, 0, 5}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
-  return SONDE_OK;
+  const sonde_bounded range[] = {{"friction.mu_static", f->mu_static, 0, 5},
+                                 {"friction.mu_kinetic", f->mu_kinetic, 0, f->mu_static},
+                                 {"friction.stribeck_speed_m_s", f->stribeck_speed_m_s, 1e-5, 10},
+                                 {"friction.gel_film", f->gel_film, 0, 100},
+                                 {"friction.mu_gel", f->mu_gel, 0, 5}};
+  return sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
 }
 
 static sonde_status check(const sonde_world_def *def, sonde_error *error) {
   sonde_status status = sonde_def_check("world", def->version, error);
   if (status) return status;
   bool fast = def->engine == SONDE_ENGINE_FAST;
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"dt_s", def->dt_s, 1e-7, 1},
-               {"implicitness", def->implicitness, 0, 1},
-               {"newton_iterations", def->newton_iterations, fast ? 1 : 0, 100},
-               {"pcg.relative_residual", def->pcg.relative_residual, 0, 0.5},
-               {"pcg.absolute_residual", def->pcg.absolute_residual, 0, 1},
-               {"pcg.max_iterations", def->pcg.max_iterations, 1, 1e6},
-               {"contact_law", def->contact_law, 0, SONDE_CONTACT_NODES},
-               {"engine", def->engine, 0, SONDE_ENGINE_FAST},
-               {"threads", def->threads, 0, fast ? 2 : 1},
-               {"contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0, 1e12},
-               {"contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0, 1e10},
-               {"sleep_displacement_m", def->sleep_displacement_m, 0, 1e-3}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
+  const sonde_bounded range[] = {{"dt_s", def->dt_s, 1e-7, 1},
+                                 {"implicitness", def->implicitness, 0, 1},
+                                 {"newton_iterations", def->newton_iterations, fast ? 1 : 0, 100},
+                                 {"pcg.relative_residual", def->pcg.relative_residual, 0, 0.5},
+                                 {"pcg.absolute_residual", def->pcg.absolute_residual, 0, 1},
+                                 {"pcg.max_iterations", def->pcg.max_iterations, 1, 1e6},
+                                 {"contact_law", def->contact_law, 0, SONDE_CONTACT_NODES},
+                                 {"engine", def->engine, 0, SONDE_ENGINE_FAST},
+                                 {"threads", def->threads, 0, fast ? 2 : 1},
+                                 {"contact_stiffness_n_m3", def->contact_stiffness_n_m3, 0, 1e12},
+                                 {"contact_damping_n_s_m3", def->contact_damping_n_s_m3, 0, 1e10},
+                                 {"sleep_displacement_m", def->sleep_displacement_m, 0, 1e-3}};
+  status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  if (status) return status;
   if (def->engine == SONDE_ENGINE_FAST &&
       (def->implicitness != 1 || def->contact_law == SONDE_CONTACT_VOLUME))
     return sonde_fail(
@@ -83,17 +71,13 @@ sonde_status sonde_state_set_friction(sonde_state *state, const sonde_friction *
 sonde_tuning sonde_tuning_default(void) { return (sonde_tuning){1, 1, NAN, NAN}; }
 
 sonde_status sonde_state_tune(sonde_state *state, const sonde_tuning *t, sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"stiffness_scale", t->stiffness_scale, 0.01, 100},
-               {"damping_scale", t->damping_scale, 0, 1000},
-               {"normal_damping_s", isnan(t->normal_damping_s) ? 0 : t->normal_damping_s, 0, 100},
-               {"edge_damping_s", isnan(t->edge_damping_s) ? 0 : t->edge_damping_s, 0, 100}};
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
+  const sonde_bounded range[] = {
+      {"stiffness_scale", t->stiffness_scale, 0.01, 100},
+      {"damping_scale", t->damping_scale, 0, 1000},
+      {"normal_damping_s", isnan(t->normal_damping_s) ? 0 : t->normal_damping_s, 0, 100},
+      {"edge_damping_s", isnan(t->edge_damping_s) ? 0 : t->edge_damping_s, 0, 100}};
+  sonde_status status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  if (status) return status;
   sonde_state_retune(state, t);
   return SONDE_OK;
 }

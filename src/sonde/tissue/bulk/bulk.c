@@ -27,28 +27,22 @@ sonde_bulk_law sonde_bulk_law_default(sonde_model_kind kind) {
 
 static sonde_status check_law(sonde_model_kind kind, const sonde_bulk_law *law,
                               sonde_error *error) {
-  const struct {
-    const char *name;
-    double value, low, high;
-  } range[] = {{"density_kg_m3", law->density_kg_m3, 1, 1e5},
-               {"damping_s", law->damping_s, 0, 100},
-               {"skin_n_m", law->skin_n_m, 0, 1e7},
-               {"spring_pa of fat", law->spring_pa[SONDE_LAYER_FAT], 0, 1e9},
-               {"spring_pa of muscle", law->spring_pa[SONDE_LAYER_MUSCLE], 0, 1e9},
-               {"steepening", law->steepening, 1, 1e4},
-               {"knee", law->knee, 0, 100},
-               {"volume_pa", law->volume_pa, 0, 1e10},
-               {"young_pa of fat", law->young_pa[SONDE_LAYER_FAT], 0, 1e12},
-               {"young_pa of muscle", law->young_pa[SONDE_LAYER_MUSCLE], 0, 1e12},
-               {"poisson", law->poisson, 0, 0.4999},
-               {"stiffness_scale", law->stiffness_scale, 1e-6, 1e6}};
+  const sonde_bounded range[] = {
+      {"density_kg_m3", law->density_kg_m3, 1, 1e5},
+      {"damping_s", law->damping_s, 0, 100},
+      {"skin_n_m", law->skin_n_m, 0, 1e7},
+      {"spring_pa of fat", law->spring_pa[SONDE_LAYER_FAT], 0, 1e9},
+      {"spring_pa of muscle", law->spring_pa[SONDE_LAYER_MUSCLE], 0, 1e9},
+      {"steepening", law->steepening, 1, 1e4},
+      {"knee", law->knee, 0, 100},
+      {"volume_pa", law->volume_pa, 0, 1e10},
+      {"young_pa of fat", law->young_pa[SONDE_LAYER_FAT], 0, 1e12},
+      {"young_pa of muscle", law->young_pa[SONDE_LAYER_MUSCLE], 0, 1e12},
+      {"poisson", law->poisson, 0, 0.4999},
+      {"stiffness_scale", law->stiffness_scale, 1e-6, 1e6}};
   if (kind == SONDE_TWO_LAYER || kind > SONDE_CONDENSED_SOLID)
     return sonde_fail(error, SONDE_ARGUMENT, "model kind %d is not volumetric", (int)kind);
-  for (size_t k = 0; k < SONDE_COUNT_OF(range); ++k)
-    if (!(range[k].value >= range[k].low && range[k].value <= range[k].high))
-      return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", range[k].name,
-                        range[k].value, range[k].low, range[k].high);
-  return SONDE_OK;
+  return sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
 }
 
 sonde_status sonde_model_set_bulk_law(sonde_model *model, const sonde_bulk_law *law,
