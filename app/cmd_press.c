@@ -6,8 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-static const double PA_PER_MMHG = 133.322387415;
-static const double CUFF_MOST_PA = 300 * 133.322387415, CLOSED = 0.05, CUFF_LIFT_M = 0.005;
+static const double CUFF_MOST_PA = 300 * SONDE_PA_PER_MMHG, CLOSED = 0.05, CUFF_LIFT_M = 0.005;
 
 typedef struct options {
   const char *model, *probe, *pathology, *image, *preset, *station;
@@ -38,14 +37,15 @@ static const app_option TABLE[] = {
              "point, linear, square, sphere, or a mesh file in millimetres"),
     OPT_REAL(force_n, "force-n", "F", 0.01, 200, 1, "press until the settled force is F newtons"),
     OPT_REAL(depth_m, "depth-mm", "D", -10, 60, 1e-3, "press D millimetres below the rest skin"),
-    OPT_REAL(cuff_pa, "cuff-mmhg", "P", 0, 300, PA_PER_MMHG,
+    OPT_REAL(cuff_pa, "cuff-mmhg", "P", 0, 300, SONDE_PA_PER_MMHG,
              "no probe: a cuff around the leg presses P on every vessel; also finds the pressure "
              "that closes the vein to 5 % of its area at rest"),
     OPT_TEXT(pathology, "case", "NAME",
              "healthy, partial_mural, acute_occlusive, subacute_occlusive or chronic_occlusive"),
     OPT_REAL(vein_depth_m, "vein-depth-mm", "D", 8, 50, 1e-3,
              "put the vein D below the site along its whole course, the artery 11 mm beside it"),
-    OPT_REAL(venous_pa, "venous-mmhg", "P", 0, 80, PA_PER_MMHG, "pressure in the vein; default 10"),
+    OPT_REAL(venous_pa, "venous-mmhg", "P", 0, 80, SONDE_PA_PER_MMHG,
+             "pressure in the vein; default 10"),
     OPT_REAL(thrombus_pa, "thrombus-kpa", "MU", 0.5, 100, 1e3,
              "fill the vein with a clot of this shear modulus"),
     OPT_REAL(wall_pa, "wall-kpa", "W", 10, 300, 1e3,
@@ -100,8 +100,8 @@ static void print(const press *p, const options *o) {
     print_vessel("vein", &p->vessel[0], p->cut[0]);
     print_vessel("artery", &p->vessel[1], p->cut[1]);
     if (!isnan(o->cuff_pa)) {
-      app_json_real("cuff_mmhg", o->cuff_pa / PA_PER_MMHG);
-      app_json_real("vein_closes_mmhg", p->closes_pa / PA_PER_MMHG);
+      app_json_real("cuff_mmhg", o->cuff_pa / SONDE_PA_PER_MMHG);
+      app_json_real("vein_closes_mmhg", p->closes_pa / SONDE_PA_PER_MMHG);
     }
     app_json("vein_short_mm:%g residual:%g steps:%u",
              p->cut[0] ? p->vessel[0].half_short_m * 2e3 : NAN, s->result.residual, s->iterations);
@@ -128,9 +128,9 @@ static void print(const press *p, const options *o) {
            p->vessel[0].half_short_m / p->vessel[0].rest_radius_m);
   if (p->cut[0] && !isnan(o->cuff_pa)) {
     if (isnan(p->closes_pa))
-      printf("closes        not up to %.0f mmHg\n", CUFF_MOST_PA / PA_PER_MMHG);
+      printf("closes        not up to %.0f mmHg\n", CUFF_MOST_PA / SONDE_PA_PER_MMHG);
     else
-      printf("closes        at a cuff of %.1f mmHg\n", p->closes_pa / PA_PER_MMHG);
+      printf("closes        at a cuff of %.1f mmHg\n", p->closes_pa / SONDE_PA_PER_MMHG);
   }
   if (p->cut[1]) printf("artery area   %8.1f %% of rest\n", p->vessel[1].area_ratio * 100);
   if (s->interior) settled_branches(s, false);

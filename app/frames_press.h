@@ -21,9 +21,9 @@ typedef struct press_options {
       OPT_REAL(m.force_n, "force-n", "F", 0.01, 200, 1, "with --press: settled force"),            \
       OPT_TEXT(m.probe, "probe", "NAME", "with --press: as of sonde-press(1)"),                    \
       OPT_TEXT(m.pathology, "case", "NAME", "with --press: as of sonde-press(1)"),                 \
-      OPT_REAL(m.venous_pa, "venous-mmhg", "P", 0.1, 200, 133.322387415,                           \
+      OPT_REAL(m.venous_pa, "venous-mmhg", "P", 0.1, 200, SONDE_PA_PER_MMHG,                       \
                "with --press: pressure in the vein; default of the case"),                         \
-      OPT_REAL(m.arterial_pa, "arterial-mmhg", "P", 1, 300, 133.322387415,                         \
+      OPT_REAL(m.arterial_pa, "arterial-mmhg", "P", 1, 300, SONDE_PA_PER_MMHG,                     \
                "with --press: pressure in the artery; default of the case"),                       \
       OPT_NUMBERS(                                                                                 \
           m.vein_mm, "vein-at", "X,Z", -INFINITY, INFINITY,                                        \

@@ -269,7 +269,7 @@ static sonde_status vein(report *r) {
     const float *e = look(&s, (uint64_t)k + 1);
     if (!sonde_interior_vessel_at_plane(s.interior, 0, s.pose, &v)) break;
     double centre = s.pose.position.y - v.centre_m.y;
-    true_m[used] = 2 * v.half_short_m, pressure[used] = v.outside_pa / 133.322387415;
+    true_m[used] = 2 * v.half_short_m, pressure[used] = v.outside_pa / SONDE_PA_PER_MMHG;
     // Front-to-back diameter that the picture shows: between the two walls' echoes on the middle
     // lines.
     uint32_t lines, samples;

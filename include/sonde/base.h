@@ -72,6 +72,9 @@ SONDE_API const char *sonde_status_text(sonde_status status);
 /** Version of the library as "major.minor.patch". @thread any */
 SONDE_API const char *sonde_version(void);
 
+/** Pressures of blood are given in mmHg at the boundary. */
+#define SONDE_PA_PER_MMHG 133.322387415
+
 typedef struct sonde_vec3 {
   double x, y, z;
 } sonde_vec3;

@@ -127,7 +127,7 @@ static PyObject *reset(PyObject *from, PyObject *args, PyObject *words) {
       !PyArg_ParseTuple(extent, "dd:extent_m", &start.pathology.thrombus_from_m,
                         &start.pathology.thrombus_to_m))
     return NULL;
-  if (mmhg == mmhg) start.pathology.venous_pressure_pa = mmhg * 133.322387415;
+  if (mmhg == mmhg) start.pathology.venous_pressure_pa = mmhg * SONDE_PA_PER_MMHG;
   if (gain == gain) start.settings.gain_db = gain;
   if (depth == depth) start.settings.depth_m = depth * 1e-3;
   if (frequency == frequency) start.settings.frequency_hz = frequency * 1e6;

@@ -4,6 +4,7 @@
 
 #include "base/base.h"
 #include "elements/hexahedron.h"
+#include "haptics/motion.h"
 
 #include <string.h>
 
@@ -186,10 +187,8 @@ sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
                                     sonde_equilibrium_result *result, sonde_error *error) {
   SONDE_ASSERT(e != NULL && result != NULL);
   const sonde_pose from = e->pose;
-  const sonde_quat q = q_mul(q_conj(from.rotation), pose.rotation);
-  const double turn = 2 * atan2(sqrt(q.x * q.x + q.y * q.y + q.z * q.z), fabs(q.w));
+  const double turn = sonde_quat_angle(from.rotation, pose.rotation);
   const double way = v_distance(from.position, pose.position) + turn_radius_m * turn;
-  const bool same_side = q.w >= 0;
   if (!isfinite(way)) return sonde_fail(error, SONDE_ARGUMENT, "the probe's pose is not finite");
   const size_t bytes = e->mesh->node_count * sizeof *e->moved;
   sonde_vec3 *begin = SONDE_NEW(sonde_vec3, e->mesh->node_count);
@@ -200,12 +199,7 @@ sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
   sonde_status status = SONDE_OK;
   for (double done = 0, part = whole; done < 1 && !status;) {
     const double to = done + part > 1 - 1e-9 ? 1 : done + part;
-    const double back = 1 - to, along = same_side ? to : -to;
-    const sonde_quat a = from.rotation, b = pose.rotation;
-    const sonde_pose next = {
-        v_lerp(from.position, pose.position, to),
-        q_unit((sonde_quat){back * a.w + along * b.w, back * a.x + along * b.x,
-                            back * a.y + along * b.y, back * a.z + along * b.z})};
+    const sonde_pose next = to < 1 ? sonde_pose_blend(from, pose, to) : pose;
     memcpy(e->kept, e->moved, bytes);
     for (uint32_t k = 0; k < e->zone_count; ++k) {
       const sonde_vec3 rest = e->mesh->node[e->zone_node[k]];

@@ -7,7 +7,6 @@
 #include <math.h>
 
 #define SONDE_PI 3.14159265358979323846
-#define SONDE_PA_PER_MMHG 133.322387415
 
 static inline sonde_vec3 vec3(double x, double y, double z) { return (sonde_vec3){x, y, z}; }
 static inline sonde_vec3 v_add(sonde_vec3 a, sonde_vec3 b) {

@@ -16,7 +16,7 @@ SONDE_LINK double sonde_quat_angle(sonde_quat a, sonde_quat b);
 // Along the short arc from a (t = 0) to b (t = 1).
 SONDE_LINK sonde_quat sonde_quat_slerp(sonde_quat a, sonde_quat b, double t);
 // From a towards b by a share t of the way, position straight and rotation along the short arc.
-sonde_pose sonde_pose_blend(sonde_pose a, sonde_pose b, double t);
+SONDE_LINK sonde_pose sonde_pose_blend(sonde_pose a, sonde_pose b, double t);
 // From a towards b by at most `reach_m` and `rotation_rad`; arrives exactly.
 SONDE_LINK sonde_pose sonde_pose_approach(sonde_pose a, sonde_pose b, double reach_m,
                                           double rotation_rad);

@@ -24,14 +24,10 @@ sonde_circulation sonde_circulation_default(void) {
                              .valsalva_pa = 20 * SONDE_PA_PER_MMHG};
 }
 
-static double smooth(double x) {
-  x = clamp(x, 0, 1);
-  return x * x * (3 - 2 * x);
-}
-
 static double strain_share(const sonde_circulation *c, double t) {
   if (!(c->valsalva_to_s > c->valsalva_from_s)) return 0;
-  return smooth((t - c->valsalva_from_s) / rise_s) * (1 - smooth((t - c->valsalva_to_s) / rise_s));
+  return smooth_step((t - c->valsalva_from_s) / rise_s) *
+         (1 - smooth_step((t - c->valsalva_to_s) / rise_s));
 }
 
 // Time since a smooth rise began that has reached `share`: the root of 3 x^2 - 2 x^3 = share.
@@ -84,8 +80,8 @@ double sonde_hydrostatic_pressure(const sonde_interior *in, sonde_posture postur
 double sonde_arterial_pressure(const sonde_circulation *c, double t) {
   SONDE_ASSERT(c != NULL && isfinite(t));
   double beats = c->heart_rate_hz * t, phase = beats - floor(beats);
-  double rise = smooth(phase / 0.14), fall = 1 - smooth((phase - 0.14) / 0.42);
-  double echo = 0.18 * smooth((phase - 0.40) / 0.10) * (1 - smooth((phase - 0.50) / 0.5));
+  double rise = smooth_step(phase / 0.14), fall = 1 - smooth_step((phase - 0.14) / 0.42);
+  double echo = 0.18 * smooth_step((phase - 0.40) / 0.10) * (1 - smooth_step((phase - 0.50) / 0.5));
   return c->diastolic_pa + (c->systolic_pa - c->diastolic_pa) * fmin(rise * fall + echo, 1);
 }
 
