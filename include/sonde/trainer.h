@@ -28,6 +28,10 @@ typedef struct sonde_vein_point {
   double radius_m, depth_m;
 } sonde_vein_point;
 
+/** A pose of the probe straight above a place, its plane across the vein, its face depth_m below the
+ *  skin at rest. @thread any */
+SONDE_API sonde_pose sonde_vein_pose(const sonde_vein_point *place, double depth_m);
+
 /** What a clot in a segment means. */
 typedef enum sonde_segment_kind {
   SONDE_SEGMENT_MAIN,       /**< common femoral to popliteal: proximal deep vein thrombosis */

@@ -64,6 +64,24 @@ static void a_force_is_kept_and_closes_the_vein(void **state) {
   sonde_batch_destroy(batch);
 }
 
+// The way down to the skin at the greatest speed takes nothing from the speed along the face later.
+static void a_force_leaves_the_speed_along_the_face(void **state) {
+  (void)state;
+  sonde_batch_def def = thighs(1);
+  def.drive = SONDE_BATCH_BY_FORCE, def.inside = false;
+  sonde_batch *batch = batch_of(&def);
+  sonde_batch_start start = over_the_vein(batch);
+  assert_int_equal(sonde_batch_reset(batch, 0, &start, NULL), SONDE_OK);
+  const double action[SONDE_BATCH_ACTION] = {0.02, 0, 12};
+  for (int k = 0; k < 20; ++k) step(batch, action);
+  const double *now = sonde_batch_look(batch).pose;
+  const sonde_vec3 x = q_rotate(start.world_from_probe.rotation, vec3(1, 0, 0));
+  const double way_m =
+      v_dot(v_sub(vec3(now[0], now[1], now[2]), start.world_from_probe.position), x);
+  assert_near(way_m, 0.02 * 0.4, 0.01 * 0.02 * 0.4);
+  sonde_batch_destroy(batch);
+}
+
 static void no_action_goes_far_beyond_the_limit(void **state) {
   (void)state;
   sonde_batch_def def = thighs(1);
@@ -212,6 +230,7 @@ static void bad_definitions_are_named(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_force_is_kept_and_closes_the_vein),
+      cmocka_unit_test(a_force_leaves_the_speed_along_the_face),
       cmocka_unit_test(no_action_goes_far_beyond_the_limit),
       cmocka_unit_test(a_session_feels_the_same),
       cmocka_unit_test(saved_states_go_on_alike),

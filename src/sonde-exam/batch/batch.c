@@ -80,18 +80,13 @@ static sonde_status create_parts(sonde_batch *batch, sonde_error *error) {
   for (uint32_t k = 0; k < def->patient_count; ++k) {
     // A probe starts above the first station, else the first site, else the vein's groin end.
     const sonde_case_setup *setup = def->patients[k];
-    const sonde_vein_point *p = &setup->map.point[0];
     sonde_pose above = {.rotation = quat_identity()};
     if (setup->map.station_count) {
       above = setup->map.station[0].probe;
     } else if (setup->model->site_count) {
       above = sonde_site_pose(setup->model->sites, 0);
     } else if (setup->map.point_count) {
-      const sonde_site site = {.position_m = p->skin_m,
-                               .normal = p->normal,
-                               .u = p->across,
-                               .v = v_cross(p->across, p->normal)};
-      above = sonde_site_pose(&site, 0);
+      above = sonde_vein_pose(&setup->map.point[0], 0);
     }
     above.position = v_madd(above.position, -ABOVE_M, q_rotate(above.rotation, vec3(0, 0, 1)));
     batch->patients[k].setup = setup;

@@ -22,8 +22,7 @@ void sonde_environment_step(sonde_environment *env, const double *action, uint32
   const sonde_batch_def *def = env->def;
   const double dt_s = env->subject->dt_s;
   const sonde_pose from = env->now.pose;
-  sonde_vec3 speed = at_most(vec3(number(action[0]), number(action[1]), number(action[2])),
-                             def->drive == SONDE_BATCH_BY_FORCE ? INFINITY : def->speed_m_s);
+  const sonde_vec3 asked = vec3(number(action[0]), number(action[1]), number(action[2]));
   const sonde_vec3 turn =
       at_most(vec3(number(action[3]), number(action[4]), number(action[5])), def->speed_rad_s);
   sonde_pose goal = {.position = {action[0], action[1], action[2]},
@@ -35,7 +34,6 @@ void sonde_environment_step(sonde_environment *env, const double *action, uint32
   const double way_m = fmin(share * v_distance(goal.position, from.position) + 1e-12, most_m);
   const double way_rad =
       fmin(share * sonde_quat_angle(from.rotation, goal.rotation) + 1e-12, most_rad);
-  const double wanted_n = speed.z;
   uint32_t flags = 0;
   for (uint32_t tick = 0; tick < ticks; ++tick) {
     sonde_pose before = env->now.pose, pose;
@@ -44,11 +42,12 @@ void sonde_environment_step(sonde_environment *env, const double *action, uint32
     if (def->drive == SONDE_BATCH_TO_POSE) {
       pose = sonde_pose_approach(before, goal, way_m, way_rad);
     } else {
-      if (def->drive == SONDE_BATCH_BY_FORCE) {
+      // Of BY_FORCE the third number is a force, which an admittance keeps.
+      sonde_vec3 speed = asked;
+      if (def->drive == SONDE_BATCH_BY_FORCE)
         speed.z =
-            clamp(def->admittance_m_s_n * (wanted_n - force_n), -def->speed_m_s, def->speed_m_s);
-        speed = at_most(speed, def->speed_m_s);
-      }
+            clamp(def->admittance_m_s_n * (asked.z - force_n), -def->speed_m_s, def->speed_m_s);
+      speed = at_most(speed, def->speed_m_s);
       // Velocity and angular velocity of the probe's frame, for a tick.
       const double angle = v_norm(turn) * dt_s;
       const sonde_vec3 by = v_scale(v_unit(turn, vec3(0, 0, 1)), sin(0.5 * angle));

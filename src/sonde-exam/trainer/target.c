@@ -23,13 +23,6 @@ uint32_t sonde_plan_nearest(const sonde_plan *plan, sonde_vec3 face_m) {
   return nearest;
 }
 
-// The probe across the vein, straight above a point of it, at a depth below the skin at rest.
-static sonde_pose straight_above(const sonde_vein_point *p, double depth_m) {
-  sonde_vec3 z = v_neg(p->normal), x = p->across;
-  return (sonde_pose){v_madd(p->skin_m, -depth_m, p->normal),
-                      q_from_matrix(m_columns(x, v_cross(z, x), z))};
-}
-
 // Presses healthy veins: at a station those of all its places. @return the force at which the area
 // passes `closed_ratio` of that at rest, between two looks; NaN: it never does
 static double find_closing_force(sonde_bench *bench, const sonde_plan *plan,
@@ -38,10 +31,10 @@ static double find_closing_force(sonde_bench *bench, const sonde_plan *plan,
   const double closed_ratio = plan->criteria.closed_ratio;
   double depth_m = -LIFT_M, before_n = 0, before = 1;
   while (depth_m < DEEPEST_M) {
-    sonde_pose pose = straight_above(at, depth_m);
+    sonde_pose pose = sonde_vein_pose(at, depth_m);
     for (int k = 0; k < TICKS_PER_LOOK; ++k) {
       depth_m += SPEED_M_S * BENCH_STEP_S;
-      pose = straight_above(at, depth_m);
+      pose = sonde_vein_pose(at, depth_m);
       sonde_bench_step(bench, pose);
     }
     sonde_snapshot s = sonde_bench_look(bench, pose);

@@ -298,6 +298,13 @@ sonde_status sonde_vein_map_make(const sonde_model *model, sonde_vein_map *map,
   return SONDE_OK;
 }
 
+sonde_pose sonde_vein_pose(const sonde_vein_point *place, double depth_m) {
+  SONDE_ASSERT(place != NULL && isfinite(depth_m));
+  sonde_vec3 z = v_neg(place->normal), x = place->across;
+  return (sonde_pose){v_madd(place->skin_m, -depth_m, place->normal),
+                      q_from_matrix(m_columns(x, v_cross(z, x), z))};
+}
+
 sonde_vein_point sonde_vein_at(const sonde_vein_map *map, double along_m) {
   SONDE_ASSERT(map->point_count >= 2);
   uint32_t k = 1;
