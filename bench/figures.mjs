@@ -146,7 +146,7 @@ const GROUPS = {
     measure: bin => python(bin, 'bench/batch.py').values,
   },
   learner: {
-    sources: ['src/sonde-exam/batch', 'python/sonde/gym.py', 'python/examples/learn_reach.py'],
+    sources: ['src/sonde-exam/batch', 'python/sonde/tasks.py', 'python/examples/learn_reach.py'],
     measure: bin => python(bin, 'python/examples/learn_reach.py', '--json'),
   },
   image: {

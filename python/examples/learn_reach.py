@@ -12,8 +12,7 @@ import sys
 
 import numpy as np
 
-import sonde.gym
-from sonde.gym import ReachVein, SPEED_M_S, STEP_S
+from sonde.tasks import ReachVein, SPEED_M_S, STEP_S
 
 COLUMNS, ROWS = 16, 16
 LIGHT = 2 * 3.0 / 25.0 - 1  # a normal force of 3 N

@@ -15,9 +15,7 @@ class Rows(Buffer):
 
 class VeinPoint(TypedDict):
     vein_m: Triple
-    skin_m: Triple
-    normal: Triple
-    across: Triple
+    pose: tuple[float, ...]
     along_m: float
     radius_m: float
     depth_m: float

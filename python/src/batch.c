@@ -278,18 +278,13 @@ static PyGetSetDef members[] = {
     {0}};
 
 bool py_batch_add(PyObject *module) {
-  union {
-    void (*release)(PyObject *);
-    PyObject *(*create)(PyTypeObject *, PyObject *, PyObject *);
-    void *pointer;
-  } end = {.release = release}, make = {.create = create};
-  PyType_Slot slots[] = {{Py_tp_new, make.pointer},
-                         {Py_tp_dealloc, end.pointer},
-                         {Py_tp_methods, methods},
-                         {Py_tp_getset, members},
-                         {Py_tp_doc, "Many legs under many probes, stepped together."},
-                         {0, NULL}};
-  PyType_Spec spec = {"sonde._sonde.Batch", sizeof(py_batch), 0, Py_TPFLAGS_DEFAULT, slots};
-  py_batch_type = py_add_type(module, "Batch", &spec);
+  const py_class batch = {.name = "Batch",
+                          .doc = "Many legs under many probes, stepped together.",
+                          .size = sizeof(py_batch),
+                          .create = create,
+                          .release = release,
+                          .methods = methods,
+                          .members = members};
+  py_batch_type = py_add_class(module, &batch);
   return py_batch_type != NULL;
 }

@@ -124,8 +124,8 @@ static PyObject *places(PyObject *from, void *unused) {
                 py_set(row, "closes_n", PyFloat_FromDouble(p->target.closes_n)) &&
                 py_set(row, "firm_n", PyFloat_FromDouble(p->target.firm_n)) &&
                 py_set(row, "limit_n", PyFloat_FromDouble(p->target.limit_n));
-    if (!good || PyList_Append(list, row)) Py_CLEAR(list);
-    Py_XDECREF(row);
+    if (!good) Py_CLEAR(row);
+    if (!py_append(list, row)) Py_CLEAR(list);
   }
   return list;
 }
@@ -200,18 +200,13 @@ static PyGetSetDef members[] = {
     {"places", places, NULL, "places of the plan with their forces", NULL}, {0}};
 
 bool py_exam_add(PyObject *module) {
-  union {
-    void (*release)(PyObject *);
-    PyObject *(*create)(PyTypeObject *, PyObject *, PyObject *);
-    void *pointer;
-  } end = {.release = release}, make = {.create = create};
-  PyType_Slot slots[] = {{Py_tp_new, make.pointer},
-                         {Py_tp_dealloc, end.pointer},
-                         {Py_tp_methods, methods},
-                         {Py_tp_getset, members},
-                         {Py_tp_doc, "Exam(leg, protocol): the judge of an examination."},
-                         {0, NULL}};
-  PyType_Spec spec = {"sonde._sonde.Exam", sizeof(py_exam), 0, Py_TPFLAGS_DEFAULT, slots};
-  py_exam_type = py_add_type(module, "Exam", &spec);
+  const py_class exam = {.name = "Exam",
+                         .doc = "Exam(leg, protocol): the judge of an examination.",
+                         .size = sizeof(py_exam),
+                         .create = create,
+                         .release = release,
+                         .methods = methods,
+                         .members = members};
+  py_exam_type = py_add_class(module, &exam);
   return py_exam_type != NULL;
 }

@@ -1,5 +1,6 @@
 // What is asked of a leg at rest: presses to equilibrium, pictures, estimation, prediction.
 #include "module.h"
+#include "pose.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -36,11 +37,7 @@ static sonde_status settle(pressed *p, const char *probe, sonde_pose pose, doubl
   sonde_path_def def = sonde_path_def_default();
   bool by_force = isfinite(force_n);
   if (by_force) def.force_n = force_n, depth_m = DEEPEST_M;
-  sonde_quat q = pose.rotation;
-  sonde_pose to = pose;
-  to.position.x += depth_m * 2 * (q.x * q.z + q.w * q.y);
-  to.position.y += depth_m * 2 * (q.y * q.z - q.w * q.x);
-  to.position.z += depth_m * (1 - 2 * (q.x * q.x + q.y * q.y));
+  const sonde_pose to = pose_shift(pose, depth_m, pose_axis(pose, 2));
   status = sonde_settle_path(p->state, &p->probe, pose, to, &def, NULL, &p->path, error);
   if (status || !p->setup->model->femur.face_count) return status;
   status = sonde_interior_create(p->setup->model, &p->interior, error);
@@ -258,11 +255,8 @@ static PyObject *predict(PyObject *module, PyObject *args, PyObject *words) {
                                      &error);
     Py_END_ALLOW_THREADS;
     PyObject *list = status ? py_raise(&error) : PyList_New(0);
-    for (uint32_t k = 0; list && k < t.measurements.count; ++k) {
-      PyObject *number = PyFloat_FromDouble(force_n[k]);
-      if (!number || PyList_Append(list, number)) Py_CLEAR(list);
-      Py_XDECREF(number);
-    }
+    for (uint32_t k = 0; list && k < t.measurements.count; ++k)
+      if (!py_append(list, PyFloat_FromDouble(force_n[k]))) Py_CLEAR(list);
     free(force_n);
     if (list) result = Py_BuildValue("{s:N,s:N}", "force_n", list, "errors", report_of(&report));
   }
@@ -276,8 +270,7 @@ static PyObject *sites_of(const sonde_fit_result *fit) {
     const sonde_site *s = &fit->sites[k];
     PyObject *row =
         Py_BuildValue("{s:I,s:d,s:d}", "site", s->id, "k0_n_m3", s->k0_n_m3, "xm_m", s->xm_m);
-    if (!row || PyList_Append(list, row)) Py_CLEAR(list);
-    Py_XDECREF(row);
+    if (!py_append(list, row)) Py_CLEAR(list);
   }
   return list;
 }
@@ -334,11 +327,8 @@ static sonde_status estimate(fitting *f, const sonde_fit_def *fit, sonde_error *
 static PyObject *tell_fit(fitting *f, uint32_t stages) {
   const sonde_fit_result *r = &f->result;
   PyObject *warnings = PyList_New(0);
-  for (uint32_t k = 0; warnings && k < f->doubts.count; ++k) {
-    PyObject *text = PyUnicode_FromString(f->doubts.doubt[k].sentence);
-    if (!text || PyList_Append(warnings, text)) Py_CLEAR(warnings);
-    Py_XDECREF(text);
-  }
+  for (uint32_t k = 0; warnings && k < f->doubts.count; ++k)
+    if (!py_append(warnings, PyUnicode_FromString(f->doubts.doubt[k].sentence))) Py_CLEAR(warnings);
   sonde_model *model = f->model;
   f->model = NULL;
   PyObject *leg = py_healthy(model), *sites = leg ? sites_of(r) : NULL;
@@ -392,11 +382,8 @@ static PyObject *fit(PyObject *module, PyObject *args, PyObject *words) {
 static PyObject *pathologies(PyObject *module, PyObject *unused) {
   (void)module, (void)unused;
   PyObject *list = PyList_New(0);
-  for (const char *const *name = sonde_pathology_names(); list && *name; ++name) {
-    PyObject *text = PyUnicode_FromString(*name);
-    if (!text || PyList_Append(list, text)) Py_CLEAR(list);
-    Py_XDECREF(text);
-  }
+  for (const char *const *name = sonde_pathology_names(); list && *name; ++name)
+    if (!py_append(list, PyUnicode_FromString(*name))) Py_CLEAR(list);
   return list;
 }
 

@@ -192,8 +192,8 @@ static PyObject *get_vein(PyObject *self, void *unused) {
                 py_set(row, "segment",
                        PyUnicode_FromString(
                            segment < map->segment_count ? map->segment[segment].name : ""));
-    if (!good || PyList_Append(list, row)) Py_CLEAR(list);
-    Py_XDECREF(row);
+    if (!good) Py_CLEAR(row);
+    if (!py_append(list, row)) Py_CLEAR(list);
   }
   return list;
 }
@@ -202,11 +202,8 @@ static PyObject *get_segments(PyObject *self, void *unused) {
   (void)unused;
   const sonde_vein_map *map = &((py_leg *)self)->setup.map;
   PyObject *list = PyList_New(0);
-  for (uint32_t k = 0; list && k < map->segment_count; ++k) {
-    PyObject *name = PyUnicode_FromString(map->segment[k].name);
-    if (!name || PyList_Append(list, name)) Py_CLEAR(list);
-    Py_XDECREF(name);
-  }
+  for (uint32_t k = 0; list && k < map->segment_count; ++k)
+    if (!py_append(list, PyUnicode_FromString(map->segment[k].name))) Py_CLEAR(list);
   return list;
 }
 
@@ -259,17 +256,12 @@ static PyGetSetDef members[] = {
     {0}};
 
 bool py_leg_add(PyObject *module) {
-  union {
-    void (*release)(PyObject *);
-    void *pointer;
-  } end = {.release = release};
-  PyType_Slot slots[] = {{Py_tp_dealloc, end.pointer},
-                         {Py_tp_methods, methods},
-                         {Py_tp_getset, members},
-                         {Py_tp_doc, "A leg: its model, its veins, and what is ill in them."},
-                         {0, NULL}};
-  PyType_Spec spec = {"sonde._sonde.Leg", sizeof(py_leg), 0,
-                      Py_TPFLAGS_DEFAULT | Py_TPFLAGS_DISALLOW_INSTANTIATION, slots};
-  py_leg_type = py_add_type(module, "Leg", &spec);
+  const py_class leg = {.name = "Leg",
+                        .doc = "A leg: its model, its veins, and what is ill in them.",
+                        .size = sizeof(py_leg),
+                        .release = release,
+                        .methods = methods,
+                        .members = members};
+  py_leg_type = py_add_class(module, &leg);
   return py_leg_type != NULL;
 }

@@ -1,6 +1,8 @@
 // The module, its exceptions and what all its parts use.
 #include "module.h"
 
+#include <stdio.h>
+
 PyObject *py_raise(const sonde_error *error) {
   PyObject *kind = PyExc_ValueError;
   switch (error->status) {
@@ -16,10 +18,35 @@ PyObject *py_raise(const sonde_error *error) {
   return NULL;
 }
 
-PyTypeObject *py_add_type(PyObject *module, const char *name, PyType_Spec *spec) {
-  PyObject *type = PyType_FromSpec(spec);
+PyTypeObject *py_add_class(PyObject *module, const py_class *c) {
+  // Slots are pointers to anything; C converts functions to those through a union only.
+  union {
+    PyObject *(*create)(PyTypeObject *, PyObject *, PyObject *);
+    void (*release)(PyObject *);
+    int (*buffer)(PyObject *, Py_buffer *, int);
+    void *pointer;
+  } create = {.create = c->create}, release = {.release = c->release},
+    buffer = {.buffer = c->buffer};
+  union { // the interpreter does not change the text
+    const char *from;
+    void *to;
+  } doc = {.from = c->doc};
+  const PyType_Slot all[] = {{Py_tp_new, create.pointer},       {Py_tp_dealloc, release.pointer},
+                             {Py_bf_getbuffer, buffer.pointer}, {Py_tp_methods, c->methods},
+                             {Py_tp_getset, c->members},        {Py_tp_doc, doc.to}};
+  enum { SLOTS = sizeof all / sizeof *all };
+  PyType_Slot used[SLOTS + 1] = {{0, NULL}};
+  int count = 0;
+  for (int k = 0; k < SLOTS; ++k)
+    if (all[k].pfunc) used[count++] = all[k];
+  char name[64];
+  snprintf(name, sizeof name, "sonde._sonde.%s", c->name);
+  const unsigned flags =
+      c->create ? Py_TPFLAGS_DEFAULT : Py_TPFLAGS_DEFAULT | Py_TPFLAGS_DISALLOW_INSTANTIATION;
+  PyType_Spec spec = {name, (int)c->size, 0, flags, used};
+  PyObject *type = PyType_FromSpec(&spec);
   if (!type) return NULL;
-  if (PyModule_AddObjectRef(module, name, type)) {
+  if (PyModule_AddObjectRef(module, c->name, type)) {
     Py_DECREF(type);
     return NULL;
   }
@@ -29,6 +56,13 @@ PyTypeObject *py_add_type(PyObject *module, const char *name, PyType_Spec *spec)
 bool py_set(PyObject *dict, const char *key, PyObject *value) {
   if (!value) return false;
   int failed = PyDict_SetItemString(dict, key, value);
+  Py_DECREF(value);
+  return failed == 0;
+}
+
+bool py_append(PyObject *list, PyObject *value) {
+  if (!value) return false;
+  int failed = PyList_Append(list, value);
   Py_DECREF(value);
   return failed == 0;
 }

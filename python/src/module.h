@@ -45,14 +45,26 @@ PyObject *py_healthy(sonde_model *model);
 // RuntimeError. @return NULL
 PyObject *py_raise(const sonde_error *error);
 
+// A type of the module: what is NULL it has not; without `create` Python code makes none.
+typedef struct py_class {
+  const char *name, *doc;
+  size_t size;
+  PyObject *(*create)(PyTypeObject *, PyObject *, PyObject *);
+  void (*release)(PyObject *);
+  int (*buffer)(PyObject *, Py_buffer *, int);
+  PyMethodDef *methods;
+  PyGetSetDef *members;
+} py_class;
 // Makes a type and puts it into the module. @return NULL with an exception
-PyTypeObject *py_add_type(PyObject *module, const char *name, PyType_Spec *spec);
+PyTypeObject *py_add_class(PyObject *module, const py_class *description);
 // Seven numbers x y z (m), w x y z. @return false with an exception
 bool py_read_pose(PyObject *from, sonde_pose *pose);
 PyObject *py_make_pose(sonde_pose pose);
 PyObject *py_make_vec3(sonde_vec3 v);
 // Sets a key and releases the value; false when the value is NULL or on failure.
 bool py_set(PyObject *dict, const char *key, PyObject *value);
+// Appends a value and releases it; false when the value is NULL or on failure.
+bool py_append(PyObject *list, PyObject *value);
 // A path as a C string of the object `*keep`, which the caller releases. NULL with an exception
 const char *py_path(PyObject *path, PyObject **keep);
 

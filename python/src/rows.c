@@ -65,14 +65,11 @@ static void release(PyObject *self) {
 }
 
 bool py_rows_add(PyObject *module) {
-  union {
-    int (*get)(PyObject *, Py_buffer *, int);
-    void (*release)(PyObject *);
-    void *pointer;
-  } get = {.get = get_buffer}, end = {.release = release};
-  PyType_Slot slots[] = {{Py_bf_getbuffer, get.pointer}, {Py_tp_dealloc, end.pointer}, {0, NULL}};
-  PyType_Spec spec = {"sonde._sonde.Rows", sizeof(py_rows_object), 0,
-                      Py_TPFLAGS_DEFAULT | Py_TPFLAGS_DISALLOW_INSTANTIATION, slots};
-  py_rows_type = py_add_type(module, "Rows", &spec);
+  const py_class rows = {.name = "Rows",
+                         .doc = "An array of a batch, read only; numpy.asarray() makes a view.",
+                         .size = sizeof(py_rows_object),
+                         .release = release,
+                         .buffer = get_buffer};
+  py_rows_type = py_add_class(module, &rows);
   return py_rows_type != NULL;
 }
