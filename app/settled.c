@@ -79,16 +79,9 @@ sonde_status settled_place(const settled *s, const char *model, long number, con
     return app_error(error, SONDE_NOT_FOUND, "no station '%.60s', expected one of %s",
                      station ? station : found->name, list);
   }
-  // As at the nearest site, but over the vein itself.
+  // As at the nearest site, but over the vein itself; the pose makes the axes square.
   sonde_site here = *site;
-  const sonde_vec3 n = found->normal, u = site->u;
-  const double out = vec_dot(u, n);
-  here.position_m = found->skin_m, here.normal = n;
-  sonde_vec3 across = {u.x - out * n.x, u.y - out * n.y, u.z - out * n.z};
-  const double size = sqrt(vec_dot(across, across));
-  here.u = (sonde_vec3){across.x / size, across.y / size, across.z / size};
-  here.v = (sonde_vec3){n.y * here.u.z - n.z * here.u.y, n.z * here.u.x - n.x * here.u.z,
-                        n.x * here.u.y - n.y * here.u.x};
+  here.position_m = found->skin_m, here.normal = found->normal;
   *above = sonde_site_pose(&here, 0);
   snprintf(at, 64, "%s", found->name);
   return SONDE_OK;
