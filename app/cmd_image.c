@@ -4,6 +4,7 @@
 #include "image_strain.h"
 #include "image_truth.h"
 #include "options.h"
+#include "pose.h"
 #include "scanner_choice.h"
 #include "settled.h"
 
@@ -175,11 +176,7 @@ static sonde_status place(settled *s, const options *o, sonde_error *error) {
   sonde_status status =
       o->posed ? SONDE_OK : settled_place(s, o->model, o->site, o->station, &start, at, error);
   if (status) return status;
-  // The probe turns about its own beam.
-  double c = cos(0.5 * o->turn_rad), h = sin(0.5 * o->turn_rad);
-  sonde_quat q = start.rotation;
-  start.rotation.w = q.w * c - q.z * h, start.rotation.x = q.x * c + q.y * h;
-  start.rotation.y = q.y * c - q.x * h, start.rotation.z = q.z * c + q.w * h;
+  start = pose_turn(start, 2, o->turn_rad); // about its own beam
   bool pressed = !isnan(o->force_n) || !isnan(o->press_m);
   if (pressed && o->posed && !settled_on_skin(s, &start))
     return app_error(error, SONDE_ARGUMENT, "the beam of this pose does not meet the skin");

@@ -163,18 +163,6 @@ typedef struct work {
   solved row[DEPTHS_MOST];
 } work;
 
-// Turned about its own axis 0 or 1.
-static sonde_pose turned(sonde_pose pose, int axis, double angle_rad) {
-  assert(axis == 0 || axis == 1);
-  const double c = cos(angle_rad / 2), s = sin(angle_rad / 2);
-  const sonde_quat q = pose.rotation;
-  pose.rotation = axis == 0 ? (sonde_quat){c * q.w - s * q.x, c * q.x + s * q.w, c * q.y + s * q.z,
-                                           c * q.z - s * q.y}
-                            : (sonde_quat){c * q.w - s * q.y, c * q.x - s * q.z, c * q.y + s * q.w,
-                                           c * q.z + s * q.x};
-  return pose;
-}
-
 static sonde_status open_solid(work *w, options *o, sonde_error *error) {
   assert(o->depth_count > 0);
   static const sonde_site middle = {.normal = {0, 0, 1}, .u = {1, 0, 0}, .v = {0, 1, 0}};
@@ -199,8 +187,8 @@ static sonde_status open_solid(work *w, options *o, sonde_error *error) {
   w->way = pose_axis(w->start, 2);
   w->start = pose_shift(w->start, 1e-3 * o->offset_mm[0], site->u);
   w->start = pose_shift(w->start, 1e-3 * o->offset_mm[1], site->v);
-  w->start = turned(w->start, 1, o->tilt_rad);
-  w->start = turned(w->start, 0, o->roll_rad);
+  w->start = pose_turn(w->start, 1, o->tilt_rad);
+  w->start = pose_turn(w->start, 0, o->roll_rad);
   status = sonde_equilibrium_create(&w->mesh, &w->probe, w->start, &o->def, &w->equilibrium, error);
   if (!status) sonde_equilibrium_size(w->equilibrium, &w->unknowns, &w->zone_unknowns);
   return status;
