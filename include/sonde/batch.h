@@ -67,7 +67,7 @@ typedef struct sonde_batch_def {
                                 none. A picture needs `inside` */
   const sonde_scanner *scanner;  /**< copied; NULL: the plain one */
   sonde_friction friction;       /**< default none */
-  double speed_m_s, speed_rad_s; /**< most of a probe; default 0.2 and 2 */
+  double speed_m_s, speed_rad_s; /**< greatest of a probe; default 0.2 and 2 */
   double force_limit_n;          /**< a probe is moved back along its axis while the normal force is
                                       above it; default 40 */
   double admittance_m_s_n; /**< speed along the axis per newton that is missing; default 0.02 */
@@ -98,9 +98,9 @@ typedef struct sonde_batch_view {
                               face, in the probe's frame */
   const double *vessel;  /**< [count*SONDE_BATCH_VESSEL] */
   const double *time_s;  /**< [count] since the reset */
-  const uint32_t *flags; /**< [count] SONDE_FLAG_* of the world, of all ticks of the step */
+  const uint32_t *flags; /**< [count] SONDE_FLAG_* that any tick of the step has set */
   const uint8_t *pixels; /**< [count*height*width] row 0 at the probe; NULL without pictures */
-  double width_m, height_m; /**< of the picture: of the first environment's settings */
+  double width_m, height_m; /**< of a picture by the first environment's settings */
 } sonde_batch_view;
 
 /** Builds the environments at their default starts; docs/batch.md tells what they take of memory.
@@ -134,9 +134,11 @@ SONDE_API void sonde_batch_save(const sonde_batch *batch, uint32_t index, void *
  *  @return FORMAT, MISMATCH @thread owner */
 SONDE_API sonde_status sonde_batch_restore(sonde_batch *batch, uint32_t index, const void *blob,
                                            size_t bytes, sonde_error *error);
-/** Of motion, contact and pose of all environments. @thread owner */
+/** Hash of the skin's motion and the probe's pose of all environments: equal runs have equal
+ *  hashes. @thread owner */
 SONDE_API uint64_t sonde_batch_hash(sonde_batch *batch);
-/** What a viewer or a judge reads of one environment; images are not in it. @thread owner */
+/** Snapshot of one environment as sonde_judge_feed() takes it; valid until the next step or reset.
+ *  @thread owner */
 SONDE_API const sonde_snapshot *sonde_batch_snapshot(const sonde_batch *batch, uint32_t index);
 
 #ifdef __cplusplus
