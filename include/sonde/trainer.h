@@ -28,8 +28,7 @@ typedef struct sonde_vein_point {
   double radius_m, depth_m;
 } sonde_vein_point;
 
-/** A pose of the probe straight above a place, its plane across the vein, its face depth_m below the
- *  skin at rest. @thread any */
+/** A probe's pose above a place: plane across the vein, face depth_m below the skin. @thread any */
 SONDE_API sonde_pose sonde_vein_pose(const sonde_vein_point *place, double depth_m);
 
 /** What a clot in a segment means. */
@@ -67,9 +66,8 @@ enum { SONDE_MAP_MIDDLES = 32 };
 /** Course and segments of the veins; nothing of a case's pathology. Plain data. */
 typedef struct sonde_vein_map {
   uint32_t segment_count, point_count, branch_count, station_count;
-  sonde_exam_segment
-      segment[SONDE_SEGMENTS];     /**< of the main vein from groin to knee, then others */
-  char branch[SONDE_BRANCHES][32]; /**< names of the vessels beside the femoral ones */
+  sonde_exam_segment segment[SONDE_SEGMENTS]; /**< of the main vein to the knee, then others */
+  char branch[SONDE_BRANCHES][32];            /**< names of the vessels beside the femoral ones */
   sonde_map_station station[SONDE_LANDMARKS]; /**< of a limb, from groin to calf */
   /** Middle of the leg at equal steps of z from middle_z_m[0] to [1]; all 0: not known. */
   sonde_vec3 middle_m[SONDE_MAP_MIDDLES];
@@ -92,8 +90,7 @@ SONDE_API sonde_vein_point sonde_vein_at(const sonde_vein_map *map, double along
 SONDE_API double sonde_vein_along(const sonde_vein_map *map, double z_m);
 /** Whether the thigh has a branch of that name. @thread any */
 SONDE_API bool sonde_vein_has_branch(const sonde_vein_map *map, const char *name);
-/** Index of a segment by name, or of the main vein's at a model z; SONDE_SEGMENTS when there is
- * none. @thread any */
+/** A segment by name, or the main vein's at a model z; else SONDE_SEGMENTS. @thread any */
 SONDE_API uint32_t sonde_vein_segment(const sonde_vein_map *map, const char *name);
 SONDE_API uint32_t sonde_vein_segment_at(const sonde_vein_map *map, double z_m); /**< @thread any */
 /** Title of a segment for people, e.g. "Common femoral vein". @thread any */
@@ -103,11 +100,10 @@ SONDE_API const char *sonde_segment_title(const char *name);
  *  file speaks of, or (all empty) millimetres from the groin end. */
 typedef struct sonde_station {
   char segment[32], landmark[32];
-  char
-      station[32]; /**< of the limb (docs/limb_model.md); on a thigh where its vein has the place */
-  bool of_branch;  /**< share and shift_m count along a branch from its proximal end */
-  double share;    /**< 0 at the groin end of the segment, 1 at the other */
-  double shift_m;  /**< added, towards the knee */
+  char station[32]; /**< of the limb (docs/limb_model.md), or the place of a thigh's vein */
+  bool of_branch;   /**< share and shift_m count along a branch from its proximal end */
+  double share;     /**< 0 at the groin end of the segment, 1 at the other */
+  double shift_m;   /**< added, towards the knee */
 } sonde_station;
 
 /** Where a place of the main vein is.

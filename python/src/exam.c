@@ -118,9 +118,7 @@ static PyObject *places(PyObject *from, void *unused) {
     PyObject *row = PyDict_New();
     bool good = row && py_set(row, "title", PyUnicode_FromString(p->title)) &&
                 py_set(row, "segment", PyUnicode_FromString(map->segment[p->segment].name)) &&
-                py_set(row, "skin_m", py_make_vec3(p->at.skin_m)) &&
-                py_set(row, "normal", py_make_vec3(p->at.normal)) &&
-                py_set(row, "across", py_make_vec3(p->at.across)) &&
+                py_set(row, "pose", py_make_pose(sonde_vein_pose(&p->at, 0))) &&
                 py_set(row, "closes_n", PyFloat_FromDouble(p->target.closes_n)) &&
                 py_set(row, "firm_n", PyFloat_FromDouble(p->target.firm_n)) &&
                 py_set(row, "limit_n", PyFloat_FromDouble(p->target.limit_n));

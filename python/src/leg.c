@@ -183,9 +183,7 @@ static PyObject *get_vein(PyObject *self, void *unused) {
     uint32_t segment = sonde_vein_segment_at(map, p->z_m);
     PyObject *row = PyDict_New();
     bool good = row && py_set(row, "vein_m", py_make_vec3(p->vein_m)) &&
-                py_set(row, "skin_m", py_make_vec3(p->skin_m)) &&
-                py_set(row, "normal", py_make_vec3(p->normal)) &&
-                py_set(row, "across", py_make_vec3(p->across)) &&
+                py_set(row, "pose", py_make_pose(sonde_vein_pose(p, 0))) &&
                 py_set(row, "along_m", PyFloat_FromDouble(p->along_m)) &&
                 py_set(row, "radius_m", PyFloat_FromDouble(p->radius_m)) &&
                 py_set(row, "depth_m", PyFloat_FromDouble(p->depth_m)) &&

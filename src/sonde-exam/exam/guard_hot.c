@@ -30,15 +30,6 @@ static double length_of(const sonde_probe *probe) {
   return -least;
 }
 
-// Its handle end is looked at as well where the way to the pose is unknown: there the face may have
-// come out at the other side.
-static bool is_through(const sonde_subject *subject, const sonde_probe *probe, sonde_pose pose) {
-  const sonde_subject_moment *now = &subject->now;
-  if (depth_beyond(subject, pose.position) > 0) return true;
-  if (now->placed && v_distance(pose.position, now->pose.position) <= jump_m) return false;
-  return depth_beyond(subject, pose_apply(pose, vec3(0, 0, -length_of(probe)))) > 0;
-}
-
 bool sonde_subject_guard(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose) {
   sonde_subject_moment *now = &subject->now;
   SONDE_ASSERT(probe != NULL && v_finite(pose.position));
@@ -54,10 +45,17 @@ bool sonde_subject_guard(sonde_subject *subject, const sonde_probe *probe, sonde
       now->off = sonde_surface_closest(subject->rest_skin, at).distance_m < clear_m ||
                  sonde_surface_inside(subject->rest_skin, at);
     }
-  } else if (now->carried || is_through(subject, probe, pose)) {
-    now->off = true;
-    now->restores++;
-    sonde_state_relax(subject->state);
+  } else {
+    // Where the way to the pose is unknown, the probe's face may have come out at the other side of
+    // the body: then its handle's end tells.
+    const bool jumped = !now->placed || v_distance(pose.position, now->pose.position) > jump_m;
+    const sonde_vec3 handle = pose_apply(pose, vec3(0, 0, -length_of(probe)));
+    now->off = now->carried || depth_beyond(subject, pose.position) > 0 ||
+               (jumped && depth_beyond(subject, handle) > 0);
+    if (now->off) {
+      now->restores++;
+      sonde_state_relax(subject->state);
+    }
   }
   if (now->off) now->off_tick = sonde_state_tick(subject->state);
   return now->off;
