@@ -122,6 +122,42 @@ static void jumps_are_told(void **state) {
   clear(&b);
 }
 
+// A search moves the rows that a press reaches and looks at all of them in the end. From a start in
+// which every node is displaced all rows move: both end in the one equilibrium of a shallow press,
+// and a coarse search in places that are off by less than its residual lets them be.
+static void rows_out_of_reach_are_in_balance(void **state) {
+  (void)state;
+  const double depth_m = 5e-3, displaced_m = 3e-4;
+  bench b = make("linear", fixture_world_def());
+  const uint32_t n = b.model->surface.vertex_count;
+  const double residual[] = {1e-10, 1e-10, 1e-4};
+  sonde_vec3 *place[3];
+  double force_n[3];
+  for (int k = 0; k < 3; ++k) {
+    place[k] = SONDE_NEW(sonde_vec3, n);
+    sonde_state_reset(b.state);
+    if (k == 1) {
+      for (uint32_t i = 0; i < n; ++i)
+        place[k][i] = v_madd(b.model->surface.vertices[i], -displaced_m, b.model->normal[i]);
+      sonde_state_set(b.state, place[k], NULL);
+    }
+    sonde_settle_result r =
+        sonde_settle(b.state, &b.probe, fixture_pose(depth_m), residual[k], 400);
+    assert_true(r.converged);
+    force_n[k] = r.contact_n;
+    memcpy(place[k], sonde_state_positions(b.state), n * sizeof **place);
+  }
+  double off[3] = {0};
+  for (int k = 1; k < 3; ++k)
+    for (uint32_t i = 0; i < n; ++i) off[k] = fmax(off[k], v_distance(place[k][i], place[0][i]));
+  print_message("%.3f N; all rows: %.2g m, %.2g N off; coarse: %.2g m, %.2g N off\n", force_n[0],
+                off[1], force_n[1] - force_n[0], off[2], force_n[2] - force_n[0]);
+  assert_true(off[1] < 1e-9 && fabs(force_n[1] - force_n[0]) < 1e-9 * force_n[0]);
+  assert_true(off[2] < 5e-6 && fabs(force_n[2] - force_n[0]) < 1e-4 * force_n[0]);
+  for (int k = 0; k < 3; ++k) sonde_free(place[k]);
+  clear(&b);
+}
+
 static void bad_options_are_refused(void **state) {
   (void)state;
   bench b = make("linear", fixture_world_def());
@@ -146,6 +182,7 @@ int main(void) {
       cmocka_unit_test(force_and_depth_are_one_curve),
       cmocka_unit_test(a_far_settling_is_told),
       cmocka_unit_test(jumps_are_told),
+      cmocka_unit_test(rows_out_of_reach_are_in_balance),
       cmocka_unit_test(bad_options_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,8 +8,8 @@
 #include <string.h>
 
 static const double forgiven_n = 2e-3; // two forces that differ by less agree
-static const double quick = 1e-3;      // relative residual of an equilibrium that is only compared
-static const double on_the_way = 1e-4; // relative residual of one from which the press goes on
+static const double quick = 1e-3;      // relative residual of an equilibrium on the way
+static const double closely = 1e-4;    // of one whose force has to be met
 static const double met = 1e-4;        // a force is met within this share of the force asked for
 
 // An equilibrium on the way.
@@ -84,8 +84,8 @@ static void take_step(path *p, double *step_m) {
     double share = step >= 0.999 * left ? 1 : p->here.share + step / p->length_m;
     double middle = 0.5 * (p->here.share + share);
     if (!known) settle_from(p, &p->here, share, quick, &p->whole);
-    settle_from(p, &p->here, middle, on_the_way, &p->half);
-    settle_from(p, &p->half, share, on_the_way, &p->end);
+    settle_from(p, &p->here, middle, quick, &p->half);
+    settle_from(p, &p->half, share, quick, &p->end);
     step = fmin(step, left);
     double least = fmax(p->def->tolerance * fabs(p->end.force_n), forgiven_n);
     bool same = p->whole.settled.converged && p->half.settled.converged &&
@@ -115,7 +115,7 @@ static void meet_force(path *p) {
   double low_f = p->here.force_n - wanted, high_f = p->end.force_n - wanted;
   for (int k = 0; k < 60 && fabs(p->end.force_n - wanted) > met * wanted; ++k) {
     double low = p->here.share;
-    settle_from(p, &p->here, low - low_f * (high - low) / (high_f - low_f), on_the_way, &p->end);
+    settle_from(p, &p->here, low - low_f * (high - low) / (high_f - low_f), closely, &p->end);
     double weight = k % 3 == 2 ? 0.5 : 1;
     if (p->end.force_n < wanted) {
       p->here.share = p->end.share, p->here.force_n = p->end.force_n;
@@ -132,7 +132,7 @@ static void meet_force(path *p) {
 // False when cancelled.
 static bool follow(path *p, const sonde_progress *progress) {
   double step_m = p->def->step_m;
-  settle_from(p, &p->here, 0, on_the_way, &p->end);
+  settle_from(p, &p->here, 0, closely, &p->end);
   while (p->end.settled.converged && p->end.share < 1 && p->end.force_n < p->def->force_n &&
          p->length_m > 0) {
     swap_equilibria(&p->here, &p->end);

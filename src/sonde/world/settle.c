@@ -1,6 +1,7 @@
 // Static equilibrium by pseudo-transient continuation: (M/tau^2 + K) d = F with growing tau, so
-// that far from the solution the mass damps the move and near it the iteration is Newton's. Always
-// in double precision, on the kernels of the engine.
+// that far from the solution the mass damps the move and near it the iteration is Newton's. Rows
+// that the press does not reach are in balance and stay. Always in double precision, on the kernels
+// of the engine.
 #define SONDE_REAL_DOUBLE
 #include "world/batches.h"
 #include "world/contact.h"
@@ -25,14 +26,35 @@ typedef struct balance {
   sonde_batch_sums sums;
 } balance;
 
-// Forces, contact and matrix at the displacements u.
+// Of the batches that `is_awake` marks, which move, near_list holds the first `count`: those around
+// them move too.
+static void list_around(sonde_batches *body, uint32_t count) {
+  enum { RINGS = 2 };
+  uint8_t *moves = body->common.is_awake;
+  uint32_t from = 0;
+  for (int ring = 0; ring < RINGS; ++ring) {
+    const uint32_t to = count;
+    for (; from < to; ++from) {
+      const sonde_rows *rows = &body->rows[body->near_list[from]];
+      const uint32_t *near = body->near + rows->first_near;
+      for (uint32_t n = 0; n < rows->near_count; ++n) {
+        if (moves[near[n]]) continue;
+        moves[near[n]] = 1, body->near_list[count++] = near[n];
+      }
+    }
+  }
+  SONDE_ASSERT(count <= body->common.batch_count);
+  sonde_batches_list(body, moves);
+}
+
+// Forces, contact and matrix at the displacements u, of the rows that move.
 static balance evaluate(const problem *p) {
   sonde_state *state = p->state;
   sonde_batches *body = p->body;
   const sonde_motion still = {.origin = p->pose.position};
   body->step.mass_scale = 1 / (p->tau_s * p->tau_s);
   body->corners_coupled = state->def.contact_law != SONDE_CONTACT_NODES;
-  for (uint32_t s = 0; s < body->common.batch_count; ++s) body->kernels->record(body, s);
+  for (uint32_t a = 0; a < body->awake_count; ++a) body->kernels->record(body, body->awake[a]);
   sonde_batches_detect(state, body, p->probe, p->pose, &still);
   balance at = {.sums = sonde_parts_linearise(body, false)};
   sonde_batches_advance_contact(state, body, false); // of no move: the pushes themselves
@@ -43,11 +65,38 @@ static balance evaluate(const problem *p) {
   return at;
 }
 
+static balance evaluate_all(const problem *p) {
+  memset(p->body->common.is_awake, 1, p->body->common.batch_count);
+  sonde_batches_list(p->body, p->body->common.is_awake);
+  return evaluate(p);
+}
+
+// Lists the rows that move: displaced ones, those whose forces are out of balance by more than
+// their share of `residual_n`, and what is around them. Of a volumetric body all move, since its
+// inside hands forces on at once.
+static void choose(const problem *p, double residual_n) {
+  const double displaced_m = 1e-4;
+  sonde_batches *body = p->body;
+  const uint32_t batches = body->common.batch_count;
+  uint8_t *moves = body->common.is_awake;
+  uint32_t count = 0;
+  const double least2 = residual_n * residual_n / batches;
+  for (uint32_t s = 0; s < batches; ++s) {
+    moves[s] = body->moved2[s] > displaced_m * displaced_m || p->state->model->bulk ||
+               total(dot(body->batch[s].r, body->batch[s].r)) > least2;
+    if (moves[s]) body->near_list[count++] = s;
+  }
+  list_around(body, count);
+  for (uint32_t s = 0; s < batches; ++s)
+    if (!moves[s]) sonde_batches_still(body, s, 1);
+}
+
 // From the base along the solution, each node at most as far as its model lets it, and 5 mm.
 static void move(const problem *p, double share) {
   const double longest = 5e-3;
   SONDE_ASSERT(share > 0);
-  for (uint32_t s = 0; s < p->body->common.batch_count; ++s) {
+  for (uint32_t a = 0; a < p->body->awake_count; ++a) {
+    const uint32_t s = p->body->awake[a];
     const sonde_batch *base = &p->body->base[s];
     sonde_batch *at = &p->body->batch[s];
     double moved2 = 0;
@@ -72,7 +121,8 @@ static bool line_search(const problem *p, double share, double first_slope, bala
     balance next = evaluate(p);
     // r.d over the free nodes, d the way from the base: with F there minus the slope of the energy.
     wide_sum sum = {0};
-    for (uint32_t s = 0; s < p->body->common.batch_count; ++s) {
+    for (uint32_t a = 0; a < p->body->awake_count; ++a) {
+      const uint32_t s = p->body->awake[a];
       const sonde_batch *base = &p->body->base[s], *at = &p->body->batch[s];
       for (int c = 0; c < 3; ++c) sum += at->r[c] * (at->u[c] - base->u[c]);
     }
@@ -91,14 +141,15 @@ static const double SLOWED_S = 1; // tau of volumetric bodies at first
 
 // The solution goes to the base with the displacements it starts from; returns F.d of the whole
 // step.
-static double solve(const problem *p, const balance *now) {
+static double solve(const problem *p, const balance *now, double goal) {
   sonde_batches *body = p->body;
   sonde_pcg_result *solver = &p->state->solver;
-  const sonde_pcg_options options = {1e-4, 1e-14, 600};
+  const sonde_pcg_options options = {1e-2, 1e-14, 600};
   wide_sum descent = {0};
-  uint32_t count = body->common.batch_count;
-  double target = fmax(options.relative_residual * now->residual, options.absolute_residual);
-  for (uint32_t s = 0; s < count; ++s) {
+  double target = fmax(options.relative_residual * now->residual, 0.1 * goal);
+  target = fmax(target, options.absolute_residual);
+  for (uint32_t a = 0; a < body->awake_count; ++a) {
+    const uint32_t s = body->awake[a];
     memcpy(body->base[s].u, body->batch[s].u, sizeof body->base[s].u);
     memcpy(body->base[s].r, body->batch[s].r, sizeof body->base[s].r);
   }
@@ -111,16 +162,21 @@ static double solve(const problem *p, const balance *now) {
                                                &solver->iterations);
     solver->converged = solver->residual <= target;
   }
-  for (uint32_t s = 0; s < count; ++s) {
+  for (uint32_t a = 0; a < body->awake_count; ++a) {
+    const uint32_t s = body->awake[a];
     memcpy(body->base[s].x, body->batch[s].x, sizeof body->base[s].x);
     descent += dot(body->base[s].r, body->base[s].x);
   }
   return total(descent);
 }
 
+// Newton's iterations on the rows that move, until these are in balance within half of what may be
+// left; then all rows are looked at, and those that are not in balance move as well.
 static sonde_settle_result iterate(problem *p, double relative, uint32_t limit) {
+  const double least_n = 1e-12;
   sonde_settle_result result = {0};
   const sonde_contact *contact = &p->state->contact;
+  choose(p, INFINITY);
   balance now = evaluate(p);
   for (uint32_t r = 0; p->probe && r < contact->region_count; ++r)
     result.start_depth_m = fmax(result.start_depth_m, contact->region[r].depth_max_m);
@@ -128,15 +184,32 @@ static sonde_settle_result iterate(problem *p, double relative, uint32_t limit) 
   // when eight iterations bring no progress and recovers with progress.
   double share = 1, best = now.residual;
   uint32_t stalled = 0;
-  while (result.iterations < limit) {
-    result.converged = now.residual <= relative * now.load || now.residual <= 1e-12;
-    if (result.converged) break;
-    double descent = solve(p, &now);
+  for (;;) {
+    // Rows that the probe touches and that stand still join those that move.
+    sonde_batches *body = p->body;
+    uint32_t joined = 0;
+    for (uint32_t k = 0; k < body->contact_count; ++k) {
+      const uint32_t s = body->contact_batch[k];
+      if (body->common.is_awake[s]) continue;
+      body->common.is_awake[s] = 1, body->near_list[joined++] = s;
+    }
+    if (joined > 0) list_around(body, joined), now = evaluate(p);
+    const double goal = fmax(0.5 * relative * now.load, least_n);
+    if (now.residual <= goal || result.iterations >= limit) {
+      now = evaluate_all(p);
+      result.converged = now.residual <= fmax(relative * now.load, least_n);
+      if (result.converged || result.iterations >= limit) break;
+      choose(p, goal);
+      now = evaluate(p);
+    }
+    double descent = solve(p, &now, goal);
     result.iterations++;
     if (!line_search(p, share, descent, &now)) {
       p->tau_s *= 0.05;
-      for (uint32_t s = 0; s < p->body->common.batch_count; ++s)
+      for (uint32_t a = 0; a < p->body->awake_count; ++a) {
+        const uint32_t s = p->body->awake[a];
         memcpy(p->body->batch[s].u, p->body->base[s].u, sizeof p->body->base[s].u);
+      }
       now = evaluate(p);
       continue;
     }
@@ -168,7 +241,6 @@ static bool begin(sonde_state *state, problem *p) {
   body->common.calls->import(&body->common, state->nodes.rest, state->position, state->velocity,
                              true);
   memset(body->is_near, 0, body->common.batch_count);
-  sonde_batches_list(body, body->common.is_awake);
   body->step.reach = body->step.force_scale = body->step.stiffness_scale = 1;
   body->step.damping_scale = 0;
   *p = (problem){.state = state,
