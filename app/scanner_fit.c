@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NUMBERS = 18, POPULATION = 10, PARENTS = 5, WIDE = 512 };
+enum { NUMBERS = 19, POPULATION = 10, PARENTS = 5, WIDE = 512 };
 
 // What the search may change, and within what.
 static const struct {
@@ -22,7 +22,8 @@ static const struct {
     {"pulse_wavelengths", 0.9, 3}, {"look_deg", 0, 12},    {"noise_db", -100, -50},
     {"compensation_db", 35, 90},   {"haze_db", -60, -20},  {"white_db", 15, 45},
     {"map_gamma", 0.6, 2.8},       {"map_knee", 0, 0.8},   {"filter", 0, 0.8},
-    {"filter_mm", 0.3, 1.2},       {"sharpening", 0, 1.2}, {"ghost_db", -30, -6}};
+    {"filter_mm", 0.3, 1.2},       {"sharpening", 0, 1.2}, {"ghost_db", -30, -6},
+    {"tgc_db_per_cm", -6, 2}};
 
 typedef struct bench {
   settled scene[SCANNER_FIT_MODELS];

@@ -12,11 +12,12 @@
 enum { SIDE = 64, WIDTH = 512, LAGS = 24, LEVELS = 5 };
 
 static const char *const NAMES[TEXTURE_FEATURES] = {
-    "grey mean",      "grey deviation", "grey 5 %",       "grey 50 %",      "grey 95 %",
-    "skewness",       "kurtosis",       "axial width",    "lateral width",  "axial lag 4",
-    "lateral lag 4",  "axial lag 8",    "lateral lag 8",  "line direction", "line strength",
-    "energy at 1 px", "energy at 2 px", "energy at 4 px", "energy at 8 px", "tails at 1 px",
-    "tails at 4 px",  "axial lag 1",    "axial lag 2",    "lateral lag 1",  "lateral lag 2"};
+    "grey mean",       "grey deviation", "grey 5 %",       "grey 50 %",      "grey 95 %",
+    "skewness",        "kurtosis",       "axial width",    "lateral width",  "axial lag 4",
+    "lateral lag 4",   "axial lag 8",    "lateral lag 8",  "line direction", "line strength",
+    "energy at 1 px",  "energy at 2 px", "energy at 4 px", "energy at 8 px", "tails at 1 px",
+    "tails at 4 px",   "axial lag 1",    "axial lag 2",    "lateral lag 1",  "lateral lag 2",
+    "skewness at 1 px"};
 
 const char *texture_name(uint32_t feature) {
   assert(feature < TEXTURE_FEATURES);
@@ -105,6 +106,7 @@ static void measure(const double *p, double f[TEXTURE_FEATURES]) {
     for (int i = 0; i < SIDE * SIDE; ++i) rest[i] = level[k][i] - level[k + 1][i];
     moments(rest, b);
     f[15 + k] = log(b[1] / m[1] + 1e-6);
+    if (k == 0) f[25] = b[2];
     if (k == 0 || k == 2) f[19 + k / 2] = log(b[3] + 3.01);
   }
 }

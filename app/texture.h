@@ -4,7 +4,7 @@
 
 #include "sonde/sonde.h"
 
-enum { TEXTURE_FEATURES = 25, TEXTURE_QUANTILES = 3, TEXTURE_MOST_PATCHES = 4096 };
+enum { TEXTURE_FEATURES = 26, TEXTURE_QUANTILES = 3, TEXTURE_MOST_PATCHES = 4096 };
 
 // Features of the patches of some pictures.
 typedef struct texture_table {

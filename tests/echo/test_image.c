@@ -87,13 +87,15 @@ static void lumen_is_dark_bone_shadows(void **state) {
   bench b;
   bench_create(&b, leg_radius, 0.014, 0.012, false, true);
   b.settings.depth_m = 0.08;
+  // Without the receiver's noise, 11 dB below muscle at the shadow's depth: late echoes are left.
+  b.echo->scanner.noise_db = -150;
   look(&b, NULL);
   double muscle = grey(&b, -0.014, 0.027, 0.006), vein = grey(&b, 0, 0.015, 0.0025);
   double artery = grey(&b, 0.011, 0.015, 0.002), shadow = grey(&b, 0, 0.073, 0.003);
   print_message("muscle %.0f vein %.1f artery %.1f shadow %.1f\n", muscle, vein, artery, shadow);
   assert_true(muscle > 55 && muscle < 95);
   assert_true(vein < 0.5 * muscle && artery < 0.5 * muscle);
-  assert_true(shadow < 0.42 * muscle);
+  assert_true(shadow < 0.25 * muscle);
   // The cortex is the brightest thing below the fascia: at 80 - 14 - 3 = 63 mm.
   double cortex = 0;
   for (double z = 0.0615; z < 0.0645; z += 1e-4) cortex = fmax(cortex, grey(&b, 0, z, 2e-4));

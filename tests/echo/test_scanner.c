@@ -185,7 +185,7 @@ static void kernels_agree_on_a_full_scanner(void **state) {
   bench_create(&b, 0.08, 0.01, 4e-3, false, true);
   sonde_scanner s = full_scanner();
   s.haze_db = -30, s.ghost_db = -14, s.filter = 0.5, s.map_gamma = 1.5, s.cubic = 1;
-  s.sharpening = 0.5, s.noise_db = -80;
+  s.sharpening = 0.5, s.noise_db = -80, s.sound_speeds = 1;
   const size_t pixels = (size_t)b.image.width * b.image.height;
   uint8_t *base = SONDE_NEW(uint8_t, pixels);
   for (int curved = 0; curved < 2; ++curved) {
@@ -438,12 +438,47 @@ static void absurd_scanners_are_refused(void **state) {
   bench_clear(&b);
 }
 
+// Aberration takes of a column what it gives to those beside it: a point keeps its share, its power
+// stays, and that of a row of many columns as well.
+static void aberration_moves_power(void **state) {
+  (void)state;
+  enum { COUNT = 512, WHOLE = COUNT + 2 * HAZE_REACH };
+  static float in[2][WHOLE], ramp[2][COUNT], out[2][COUNT], kept[COUNT];
+  const halo_taps halo = {{-5, -2, 2, 5}, {0.5f, 0, -0.3f, 0.4f}, {0, 0.5f, 0.4f, 0.3f}};
+  look_job job = {.kept = kept, .kept_low = kept, .halo = &halo, .count = COUNT};
+  for (int k = 0; k < SONDE_FINE; ++k) {
+    job.re[k] = in[0] + HAZE_REACH, job.im[k] = in[1] + HAZE_REACH;
+    job.ramp_re[k] = ramp[0], job.ramp_im[k] = ramp[1];
+    job.out_re[k] = out[0], job.out_im[k] = out[1];
+  }
+  for (int l = 0; l < COUNT; ++l) ramp[0][l] = 1, kept[l] = 0.6f;
+  for (int point = 0; point < 2; ++point) {
+    double before = 0, after = 0;
+    for (int l = 0; l < COUNT; ++l) {
+      const bool empty = point ? l != COUNT / 2 : l < HAZE_REACH || l >= COUNT - HAZE_REACH;
+      for (int c = 0; c < 2; ++c) {
+        const double at = sonde_random_uniform(7, (uint64_t)(2 * l + c)) - 0.5;
+        in[c][HAZE_REACH + l] = empty ? 0 : (float)at;
+        before += empty ? 0 : at * at;
+      }
+    }
+    sonde_echo_kernels_find("base")->look(&job);
+    for (int l = 0; l < COUNT; ++l) after += pow((double)out[0][l], 2) + pow((double)out[1][l], 2);
+    print_message("power %.3f of it\n", after / before);
+    assert_within(after / before - 1, point ? -1e-3 : -0.1, point ? 1e-3 : 0.1);
+    if (point)
+      assert_within((double)out[0][COUNT / 2] / (double)in[0][HAZE_REACH + COUNT / 2], 0.599,
+                    0.601);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(looks_average_speckle_as_their_overlap_says),
       cmocka_unit_test(looks_leave_lumina_as_wide),
       cmocka_unit_test(live_picture_of_still_tissue_is_the_still),
       cmocka_unit_test(kernels_agree_on_a_full_scanner),
+      cmocka_unit_test(aberration_moves_power),
       cmocka_unit_test(sliders_and_ceiling_shape_the_compensation),
       cmocka_unit_test(filter_keeps_an_edge),
       cmocka_unit_test(filter_smooths_along_lines),

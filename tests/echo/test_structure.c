@@ -37,13 +37,13 @@ static void muscle_has_stripes_along_and_dots_across(void **state) {
   bench b;
   bench_create(&b, leg_radius, 0.014, 0.006, false, false);
   const double line_m = 0.04 / (b.echo->lines - 1);
-  const uint32_t far = (uint32_t)(2.5e-3 / line_m);
+  const uint32_t far = (uint32_t)(1.5e-3 / line_m);
   double like[2];
   for (int along = 0; along < 2; ++along) {
     aim(&b, along, 0);
     like[along] = alike(&b, 60, 100, far, 0);
   }
-  print_message("2.5 mm beside: %.2f along the fibres, %.2f across\n", like[1], like[0]);
+  print_message("1.5 mm beside: %.2f along the fibres, %.2f across\n", like[1], like[0]);
   assert_true(like[1] > like[0] + 0.15);
   assert_true(like[0] < 0.35);
   bench_clear(&b);

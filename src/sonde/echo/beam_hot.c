@@ -2,7 +2,7 @@
 // lateral kernels, axial kernels, receiver noise, time-gain compensation, logarithm.
 #include "base/base.h"
 #include "base/random.h"
-#include "echo/echo.h"
+#include "echo/sound.h"
 
 #include <string.h>
 
@@ -144,11 +144,16 @@ static void filter_row(sonde_echo *echo, uint32_t sample, bool tissue) {
   const double *sheet = psf->sheet + above;
   if (tissue)
     sonde_sheet_lay(echo, sample, (float)(1 / (scale * (sheet[0] + t * (sheet[1] - sheet[0])))));
-  // Every look of it.
+  // Every look of it, spread by aberration.
+  const float deep = (float)(clamp(depth / f->depth_m, 0, 1 - 1e-6) * KEPT_DEPTHS);
+  const uint32_t table = (uint32_t)deep;
   for (uint32_t n = 0; n < echo->now_looks; ++n) {
     const uint32_t which = (echo->first_look + n) % echo->looks;
     const bool turned = tissue && !echo->bare;
     look_job look = {.count = merge.count, .haze = f->scanner->haze_db > -90 ? &echo->haze : NULL};
+    if (sonde_sound_on(echo))
+      look.kept = echo->sound->kept[table], look.kept_low = echo->sound->kept[table + 1],
+      look.share = deep - (float)table, look.halo = &echo->sound->halo;
     for (int k = 0; k < SONDE_FINE; ++k) {
       look.re[k] = echo->line_re[k], look.im[k] = echo->line_im[k];
       look.ramp_re[k] = echo->ramp_re[which][k], look.ramp_im[k] = echo->ramp_im[which][k];

@@ -55,13 +55,27 @@ static void merge(const merge_job *job) {
   }
 }
 
-// A merged row of a look: side lobes join, and every column turns by the look's phase.
+// A merged row of a look: aberration spreads it, side lobes join, and every column turns by the
+// look's phase.
 static void look(const look_job *job) {
   SONDE_ASSERT(job->count % ECHO_ALIGN == 0);
   for (int part = 0; part < SONDE_FINE; ++part)
     for (uint32_t l = 0; l < job->count; l += FLOATS) {
       const float *re = job->re[part] + l, *im = job->im[part] + l;
       floats x = vload(re), y = vload(im);
+      if (job->kept) {
+        const floats top = vload(job->kept + l);
+        const floats kept = top + job->share * (vload(job->kept_low + l) - top);
+        const floats lost = vsqrt(vmax(1 - kept * kept, vset(0)));
+        floats u = vset(0), v = vset(0);
+        for (int t = 0; t < HALO_TAPS; ++t) {
+          const int32_t at = job->halo->offset[t];
+          floats a = vload(re + at), b = vload(im + at);
+          u = u + job->halo->re[t] * a - job->halo->im[t] * b;
+          v = v + job->halo->re[t] * b + job->halo->im[t] * a;
+        }
+        x = kept * x + lost * u, y = kept * y + lost * v;
+      }
       for (int t = 0; job->haze && t < HAZE_TAPS; ++t) {
         const int32_t at = job->haze->offset[t];
         floats a = vload(re + at), b = vload(im + at);

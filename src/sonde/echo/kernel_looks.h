@@ -21,13 +21,24 @@ typedef struct haze_taps {
   float re[HAZE_TAPS], im[HAZE_TAPS];
 } haze_taps;
 
+// What aberration sends into a column from beside it, where it takes from its own.
+enum { HALO_TAPS = 4 };
+typedef struct halo_taps {
+  int32_t offset[HALO_TAPS]; // lines
+  float re[HALO_TAPS], im[HALO_TAPS];
+} halo_taps;
+
 // A merged row with its side lobes, times a phase per column.
 typedef struct look_job {
   const float *re[SONDE_FINE], *im[SONDE_FINE];           // [count], HAZE_REACH more on both sides
   const float *ramp_re[SONDE_FINE], *ramp_im[SONDE_FINE]; // [count]
   const haze_taps *haze;                                  // NULL: none
-  uint32_t count;                                         // multiple of ECHO_ALIGN
-  float *out_re[SONDE_FINE], *out_im[SONDE_FINE];         // [count]
+  // [count] amplitude that a column keeps, at the depths above and below; NULL: all
+  const float *kept, *kept_low;
+  float share; // of the distance from kept to kept_low
+  const halo_taps *halo;
+  uint32_t count;                                 // multiple of ECHO_ALIGN
+  float *out_re[SONDE_FINE], *out_im[SONDE_FINE]; // [count]
 } look_job;
 
 typedef struct lateral_job {

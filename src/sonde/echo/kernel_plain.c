@@ -195,6 +195,18 @@ static void look(const look_job *job) {
   for (uint32_t i = 0; i < SONDE_FINE * job->count; ++i) {
     const uint32_t part = i % SONDE_FINE, l = i / SONDE_FINE;
     double re = (double)job->re[part][l], im = (double)job->im[part][l];
+    if (job->kept) {
+      const double top = (double)job->kept[l], low = (double)job->kept_low[l];
+      const double kept = top + (double)job->share * (low - top), lost = sqrt(1 - kept * kept);
+      double a = 0, b = 0;
+      for (int t = 0; t < HALO_TAPS; ++t) {
+        const int64_t at = (int64_t)l + job->halo->offset[t];
+        const double u = (double)job->halo->re[t], v = (double)job->halo->im[t];
+        const double x = (double)job->re[part][at], y = (double)job->im[part][at];
+        a += u * x - v * y, b += u * y + v * x;
+      }
+      re = kept * re + lost * a, im = kept * im + lost * b;
+    }
     for (int t = 0; job->haze && t < HAZE_TAPS; ++t) {
       const float *x = job->re[part] + (int64_t)l + job->haze->offset[t],
                   *y = job->im[part] + (int64_t)l + job->haze->offset[t];

@@ -415,5 +415,7 @@ void sonde_echo_medium(sonde_echo *echo) {
     store_gain(echo, row);
     for (uint32_t l = 0; l < lines; ++l) echo->loss_db[l] += echo->loss[l] * step;
   }
-  if (sonde_sound_on(echo)) sonde_sound_end(echo);
+  if (!sonde_sound_on(echo)) return;
+  sonde_sound_end(echo);
+  if (!echo->bare) sonde_aberration_find(echo);
 }

@@ -15,6 +15,10 @@ enum {
   SHIFT_COLUMNS =
       (SONDE_FINE * SONDE_MOST_LINES + 2 * SONDE_MOST_TAPS + 4 * ECHO_ALIGN) / SHIFT_STEP + 2,
 };
+enum {
+  KEPT_DEPTHS = 12, // depths of the aberration's table, beside the face
+  KEPT_COLUMNS = SONDE_MOST_LINES + SONDE_MOST_TAPS + 2 * ECHO_ALIGN
+};
 _Static_assert((SOUND_ROWS - 1) * SOUND_EVERY == SONDE_MEDIUM_ROWS - 1, "the last row is tabled");
 
 typedef struct sonde_sound {
@@ -31,6 +35,11 @@ typedef struct sonde_sound {
   uint32_t next[SONDE_MOST_LINES / 4]; // drawn row of the gains to come, per four lines
   // Rays by row and line.
   float trace_line[SOUND_ROWS][SONDE_MOST_LINES], trace_shown[SOUND_ROWS][SONDE_MOST_LINES];
+  float trace_slow[SOUND_ROWS][SOUND_WIDE]; // way that it adds in one, m
+  // Amplitude that aberration leaves of a point, by depth and even column of the grid, and where
+  // the rest goes.
+  float kept[KEPT_DEPTHS + 1][KEPT_COLUMNS];
+  halo_taps halo;
   // From a true place to the drawn one: columns of the grid, 0, rows of the grid, 0.
   float_x4 shift[SOUND_ROWS][SHIFT_COLUMNS];
 } sonde_sound;
@@ -54,6 +63,8 @@ float sonde_sound_depth(const sonde_echo *echo, uint32_t line, float share, floa
 void sonde_sound_draw_gain(sonde_echo *echo, uint32_t row);
 // The tables, after the last row.
 void sonde_sound_end(sonde_echo *echo);
+// What aberration leaves, after the last row.
+void sonde_aberration_find(sonde_echo *echo);
 // The true line and depth of a drawn one.
 void sonde_sound_true_place(const sonde_echo *echo, double *line, double *depth_m);
 // Takes an affine map of the grid to where it is drawn.

@@ -13,6 +13,8 @@ typedef struct medium {
 } medium;
 static const medium skin = {1624, 1109}, fat = {1440, 911}, muscle = {1580, 1090},
                     blood = {1578, 1050}, fluid = {1525, 1005};
+static const float septum_m =
+    0.2e-3f; // thickness of the fat's septa, which are of the dermis's tissue
 
 // The beam that a structure bends aims at the focus, and at least so much deeper than it.
 static const float least_aim_m = 8e-3f;
@@ -55,9 +57,10 @@ void sonde_sound_aim(sonde_echo *echo, float rows_on) {
 }
 
 // Slowness of the row: the tissues' shares of a step about it, from the levels' distances.
-static void find_slowness(sonde_echo *echo, const float *level) {
+static void find_slowness(sonde_echo *echo, uint32_t row) {
   sonde_sound *s = echo->sound;
   const uint32_t n = echo->padded, walls = LAYER_LEVELS, edges = walls + echo->shown_count;
+  const float *level = echo->level[row % 2];
   const float per_row = 1 / row_m(echo), all = (float)echo->scanner.sound_speeds;
   const float c0 = (float)sonde_sound_m_s;
   const sonde_lesion *lesion = echo->interior->findings.lesion;
@@ -77,12 +80,18 @@ static void find_slowness(sonde_echo *echo, const float *level) {
   for (uint32_t k = walls; k < edges; ++k)
     part[parts].level = k, part[parts].side = -1, part[parts++].slow = c0 / blood.speed;
   const float_x4 none = vset_float_x4(0), one = vset_float_x4(1);
+  // The fat's septa are thinner than a row is deep, which they fill in part.
+  const float *septum = echo->septum[row % 2], *strength = echo->septum[2];
+  const float tough_slow = c0 / skin.speed;
   for (uint32_t l = 0; l < n; l += 4) {
     float_x4 slow = vset_float_x4(c0 / skin.speed);
     for (uint32_t k = 0; k < parts; ++k) {
       const float_x4 rows = part[k].side * per_row * vload_float_x4(level + part[k].level * n + l);
       slow += vmin(vmax(rows + 0.5f, none), one) * (part[k].slow - slow);
     }
+    const float_x4 thick = septum_m * per_row * vload_float_x4(strength + l);
+    const float_x4 reach = 0.5f * (thick + 1) - per_row * vabs(vload_float_x4(septum + l));
+    slow += vmin(vmax(reach, none), vmin(thick, one)) * (tough_slow - slow);
     const float_x4 inside = vmin(vmax(per_row * vload_float_x4(level + l) + 0.5f, none), one);
     vstore_float_x4(s->slow + l, all * inside * (slow - 1));
   }
@@ -107,7 +116,7 @@ void sonde_sound_step(sonde_echo *echo, uint32_t row) {
   const frame *f = &echo->frame;
   const uint32_t lines = echo->lines;
   const float dz = row_m(echo), z = (float)row * dz, per_m = lines_per_m(f, z);
-  find_slowness(echo, echo->level[row % 2]);
+  find_slowness(echo, row);
   // Half the beam's width here, lines.
   const double number = 0.5 * (f->scanner->transmit_f + f->scanner->receive_f);
   const float aim = fmaxf((float)f->focus_m, z + least_aim_m);
@@ -146,6 +155,10 @@ void sonde_sound_step(sonde_echo *echo, uint32_t row) {
     vstore_float_x4(s->spread + l,
                     vmin(vmax(2 / near, vset_float_x4(least_spread)), vset_float_x4(most_spread)));
   }
+  float *way = s->trace_slow[row / SOUND_EVERY] + SOUND_MARGIN;
+  const float keep = row % SOUND_EVERY ? 1 : 0;
+  for (uint32_t l = 0; l < lines; l += 4)
+    vstore_float_x4(way + l, keep * vload_float_x4(way + l) + dz * vload_float_x4(s->slow + l));
   if (row % SOUND_EVERY == 0)
     for (uint32_t l = 0; l < echo->padded; ++l) {
       s->trace_line[row / SOUND_EVERY][l] = s->line[l];

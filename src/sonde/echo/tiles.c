@@ -61,16 +61,18 @@ static float patch(float floor_of, float rise, float noise) {
   return root * root;
 }
 
-// Adds sheets to `out`: `count` of them along z, bent by `bend`, in patches of `strength`.
+// Sheets of a tile: `count` of them along z, which climb by `turns` of them along x and along y.
 typedef struct sheets {
-  float count, spacing_mm, half_mm, level, floor, rise;
+  float count, spacing_mm, half_mm, level, floor, rise, turns[2];
 } sheets;
 
+// Adds sheets to `out`, bent by `bend`, in patches of `strength`.
 static void add_sheets(float *out, const sheets *s, const float *bend, float bent,
                        const float *strength) {
   SONDE_ASSERT(s->count > 0 && s->half_mm > 0);
   for (uint32_t i = 0; i < VOXELS; ++i) {
-    const float phase = s->count * (float)(i / (SIDE * SIDE)) / SIDE + bent * bend[i];
+    const float x = (float)(i % SIDE), y = (float)(i / SIDE % SIDE), z = (float)(i / (SIDE * SIDE));
+    const float phase = (s->count * z + s->turns[0] * x + s->turns[1] * y) / SIDE + bent * bend[i];
     const float height = profile(phase, s->spacing_mm, s->half_mm);
     if (height > 0) out[i] += s->level * height * patch(s->floor, s->rise, strength[i]);
   }
@@ -100,18 +102,22 @@ static void pack(const draft *d, uint32_t *word) {
   }
 }
 
-// Lobules between two generations of septa along the skin, in 32 x 32 x 16 mm: bent sheets every
-// 1.6 and 0.57 mm in patches, a few upright ones every 4 mm, and dark grain.
+// Lobules of fat in 32 x 32 x 16 mm: two generations of septa, 3.0 and 2.4 mm apart, lean against
+// each other by 20 degrees around the leg and 10 along it and close lenses of 8 mm between them;
+// fine sheets every 0.57 mm, a few upright ones every 4 mm, and dark grain.
 static void draw_fat(draft *d, uint32_t *word) {
   float *bend = d->noise[0], *fine = d->noise[1], *strength = d->noise[2], *other = d->noise[3];
-  const sheets first = {10, 1.6f, 0.22f, 2.6f, 0.3f, 0.7f};
-  const sheets second = {28, 0.57f, 0.16f, 1.3f, 0.3f, 0.65f};
-  const sheets upright = {8, 4, 0.35f, 1.0f, -0.1f, 0.6f};
-  draw_noise(d, bend, 10, 10, 5);
-  draw_noise(d, fine, 13, 13, 8);
+  const sheets septa[2] = {{6, 3.0f, 0.20f, 2.8f, 0.1f, 0.8f, {2, 1}},
+                           {6, 2.4f, 0.18f, 2.4f, 0.1f, 0.8f, {-2, -1}}};
+  const sheets second = {28, 0.57f, 0.16f, 0.7f, 0.3f, 0.65f, {0, 0}};
+  const sheets upright = {8, 4, 0.35f, 1.0f, -0.1f, 0.6f, {0, 0}};
+  draw_noise(d, bend, 9, 9, 5);
+  draw_noise(d, fine, 15, 15, 8);
   for (uint32_t i = 0; i < VOXELS; ++i) bend[i] += 0.35f * fine[i];
-  draw_noise(d, strength, 12, 12, 10);
-  add_sheets(d->facing, &first, bend, 0.32f, strength);
+  for (int k = 0; k < 2; ++k) {
+    draw_noise(d, strength, 10, 10, 9);
+    add_sheets(d->facing, &septa[k], bend, 0.2f, strength);
+  }
   draw_noise(d, strength, 22, 22, 28);
   add_sheets(d->facing, &second, bend, 0.9f, strength);
   draw_noise(d, strength, 8, 8, 10);
@@ -124,28 +130,31 @@ static void draw_fat(draft *d, uint32_t *word) {
   pack(d, word);
 }
 
-// Fascicles between sheets of perimysium, in 19.2 mm across x 51.2 mm along the fibres (y) x 16 mm:
-// sheets every 1.33 and 0.62 mm, 0.5 to 1 mm thick, in patches 1.6 mm wide and 3 mm long, upright
-// ones every 2.4 mm, bundles of 0.45 mm.
+// Fascicles in 19.2 mm across x 51.2 mm along the fibres (y) x 16 mm: two generations of perimysium
+// every 1.7 and 1.5 mm, which cross at 8 degrees along the fibres and 10 across, in patches 1.6 mm
+// wide and 3 mm long; fine sheets every 0.62 mm, upright ones every 2.4 mm, bundles of 0.45 mm.
 static void draw_muscle(draft *d, uint32_t *word) {
   float *bend = d->noise[0], *fine = d->noise[1], *strength = d->noise[2], *other = d->noise[3];
-  const sheets first = {12, 1.33f, 0.36f, 2.8f, 0.35f, 0.6f};
-  const sheets second = {26, 0.62f, 0.22f, 1.0f, 0.3f, 0.55f};
-  const sheets upright = {8, 2.4f, 0.35f, 0.5f, 0.2f, 0.6f};
-  draw_noise(d, bend, 9, 12, 6);
-  draw_noise(d, fine, 14, 12, 12);
+  const sheets perimysium[2] = {{10, 1.66f, 0.28f, 2.8f, 0.05f, 0.8f, {1, 2}},
+                                {10, 1.54f, 0.26f, 2.6f, 0.05f, 0.8f, {-1, -2}}};
+  const sheets second = {26, 0.62f, 0.22f, 0.7f, 0.3f, 0.55f, {0, 0}};
+  const sheets upright = {8, 2.4f, 0.35f, 0.5f, 0.2f, 0.6f, {0, 0}};
+  draw_noise(d, bend, 6, 12, 6);
+  draw_noise(d, fine, 10, 12, 12);
   for (uint32_t i = 0; i < VOXELS; ++i) bend[i] += 0.4f * fine[i];
-  draw_noise(d, strength, 12, 17, 12);
-  add_sheets(d->facing, &first, bend, 0.35f, strength);
+  for (int k = 0; k < 2; ++k) {
+    draw_noise(d, strength, 9, 15, 12);
+    add_sheets(d->facing, &perimysium[k], bend, 0.3f, strength);
+  }
   draw_noise(d, strength, 22, 19, 26);
   add_sheets(d->facing, &second, bend, 0.8f, strength);
   draw_noise(d, strength, 9, 12, 12);
   draw_noise(d, other, 10, 5, 10);
   add_upright(d->body, 0, &upright, other, 0.3f, strength);
-  draw_noise(d, fine, 42, 6, 36);
+  draw_noise(d, fine, 26, 6, 38);
   draw_noise(d, other, 5, 5, 4);
   for (uint32_t i = 0; i < VOXELS; ++i) {
-    const float slow = exp2f(0.35f * other[i]);
+    const float slow = exp2f(0.45f * other[i]);
     d->body[i] = slow * (d->body[i] + 0.13f * exp2f(0.55f * fine[i])), d->facing[i] *= slow;
   }
   pack(d, word);
