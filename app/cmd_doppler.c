@@ -98,6 +98,7 @@ typedef struct record {
   double *mean, *peak;   // [count] read off the spectrum
   double *truth, *lumen; // [count] true mean velocity in the gate and over the lumen
   uint8_t *grey;         // [count * SONDE_DOPPLER_BINS] by column
+  double pressure_pa;    // in the vein at the start
   double limit, slowest; // velocities that are not folded, that pass the wall filter
 } record;
 
@@ -126,8 +127,8 @@ static void smooth(double *value, double *scratch, uint32_t count) {
 // Blood under the gate: mean velocity over the lumen every STEP_S, and what gives it its profile.
 typedef struct blood {
   uint32_t count;
-  double *mean_m_s; // [count]
-  double radius_m, fastest_m_s;
+  double *mean_m_s;                          // [count]
+  double radius_m, fastest_m_s, pressure_pa; // the last at the start
   sonde_flow_def flow;
 } blood;
 
@@ -141,12 +142,14 @@ static void follow(const blood *b, uint32_t n, double profile[SONDE_FLOW_RINGS])
 }
 
 // Runs the network, with half a window beyond the recording.
-static sonde_status run_blood(const options *a, const sonde_limb *limb, blood *b,
+static sonde_status run_blood(const options *a, const sonde_model *model, blood *b,
                               sonde_error *error) {
+  const sonde_limb *limb = sonde_limb_of(model);
   bool artery = a->vessel == SONDE_FLOW_SEGMENTS;
   sonde_flow_segment segment = (sonde_flow_segment)(artery ? SONDE_FLOW_COMMON_FEMORAL : a->vessel);
   sonde_flow_def *flow = &b->flow;
   *flow = sonde_flow_def_default(limb);
+  if (sonde_limb_pose_of(model)) sonde_flow_def_hold(sonde_limb_pose_of(model), flow);
   for (int v = 0; v < SONDE_FLOW_VEINS && a->clot >= 0; ++v)
     flow->closed[a->clot][v] = a->clot_share;
   flow->leak = a->leak;
@@ -158,6 +161,7 @@ static sonde_status run_blood(const options *a, const sonde_limb *limb, blood *b
   if (status) return status;
   const uint32_t branch =
       artery && limb ? sonde_limb_vessel_find(limb, "common femoral artery") : SONDE_LIMB_NO_VESSEL;
+  b->pressure_pa = sonde_flow_pressure(&net, segment);
   b->radius_m = sqrt(fmax(sonde_flow_area(&net, segment, 0), 1e-6) / acos(-1));
   if (artery) b->radius_m = 4.4e-3;
   if (branch != SONDE_LIMB_NO_VESSEL)
@@ -178,9 +182,11 @@ static sonde_status run_blood(const options *a, const sonde_limb *limb, blood *b
 }
 
 // The gate on the blood; a column of the spectrum every HOP_S, its time the middle of its window.
-static sonde_status take(const options *a, const sonde_limb *limb, record *r, sonde_error *error) {
+static sonde_status take(const options *a, const sonde_model *model, record *r,
+                         sonde_error *error) {
   blood b = {0};
-  sonde_status status = run_blood(a, limb, &b, error);
+  sonde_status status = run_blood(a, model, &b, error);
+  r->pressure_pa = b.pressure_pa;
   sonde_doppler_def def = sonde_doppler_def_default();
   def.half_short_m = def.half_long_m = b.radius_m;
   def.angle_rad = a->angle_rad, def.gate_m = fmin(a->gate_m, 2 * b.radius_m);
@@ -327,7 +333,7 @@ static int run(void *from) {
   sonde_status status = sonde_limb_model_load(a->model, &model, &error);
   const sonde_limb *limb = status ? NULL : sonde_limb_of(model);
   app_progress_begin("taking the spectrum");
-  if (!status) status = take(a, limb, &r, &error);
+  if (!status) status = take(a, model, &r, &error);
   if (!status && a->output) status = draw(a, &r, &error);
   sonde_file *file = NULL;
   if (!status && a->csv) status = sonde_file_create(a->csv, &file, &error);
@@ -346,6 +352,9 @@ static int run(void *from) {
   }
   readings x = read_off(a, &r);
   const bool is_limb = limb != NULL;
+  const sonde_limb_pose *pose = sonde_limb_pose_of(model);
+  sonde_limb_position position = SONDE_LIMB_POSITIONS;
+  if (pose) position = sonde_limb_pose_setting(pose).position;
   double phasicity = (x.most - x.least) / x.mean;
   if (a->json) {
     app_json_begin();
@@ -353,6 +362,9 @@ static int run(void *from) {
              a->seconds, 100 * r.limit);
     app_json("mean_cm_s:%g least_cm_s:%g most_cm_s:%g phasicity:%g peak_cm_s:%g", 100 * x.mean,
              100 * x.least, 100 * x.most, phasicity, 100 * x.peak);
+    if (a->vessel != SONDE_FLOW_SEGMENTS)
+      app_json("venous_mmhg:%g", r.pressure_pa / SONDE_PA_PER_MMHG);
+    if (pose) app_json_text("position", sonde_limb_position_name(position));
     app_json("augmentation:%g reflux_s:%g true_mean_cm_s:%g true_phasicity:%g true_reflux_s:%g",
              x.augmentation, x.reflux, 100 * x.truth_mean, x.truth_phasicity, x.truth_reflux);
     app_json_end();
@@ -360,6 +372,9 @@ static int run(void *from) {
     printf("%s: at rest %.1f cm/s in the gate (%.1f to %.1f with breath and beat, phasicity %.2f), "
            "peak %.1f cm/s\n",
            VESSELS[a->vessel], 100 * x.mean, 100 * x.least, 100 * x.most, phasicity, 100 * x.peak);
+    if (pose)
+      printf("%s: %.0f mmHg in the vein\n", sonde_limb_position_name(position),
+             r.pressure_pa / SONDE_PA_PER_MMHG);
     printf("mean over the lumen in truth %.1f cm/s; velocities beyond %.0f cm/s are folded\n",
            100 * x.truth_mean, 100 * r.limit);
     if (!isnan(x.augmentation))

@@ -138,36 +138,6 @@ static sonde_status write_cells(const char *path, const settled *s, const sonde_
   return sonde_file_commit(file, error);
 }
 
-// Steers by 20 degrees to the side on which the blood is faster along the beam.
-static void choose_steer(const sonde_flow_scene *scene, const sonde_echo *echo,
-                         sonde_colour_box *box, sonde_colour_cell *cells) {
-  static const double TRY[] = {0, 0.349, -0.349};
-  double best = -1, chosen = 0;
-  for (size_t k = 0; k < sizeof TRY / sizeof *TRY; ++k) {
-    double sum = 0;
-    box->steer_rad = TRY[k];
-    sonde_flow_scene_cells(scene, echo, box, cells);
-    for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) sum += fabs((double)cells[i].towards_m_s);
-    if (sum > 1.3 * best) best = sum, chosen = TRY[k];
-  }
-  box->steer_rad = chosen;
-}
-
-// Runs the network in the pressed vessels.
-static sonde_status run_flow(const image_colour *of, const settled *s, sonde_flow_scene **scene,
-                             sonde_error *error) {
-  const sonde_limb *limb = sonde_limb_of(s->model);
-  sonde_flow_def def = sonde_flow_def_default(limb);
-  sonde_flow flow;
-  sonde_status status = sonde_flow_scene_create(limb, s->interior, scene, error);
-  if (status) return status;
-  sonde_flow_scene_narrow(*scene, &def);
-  if (!isnan(of->squeeze_s)) def.squeeze_from_s = of->squeeze_s;
-  status = sonde_flow_start(&def, &flow, error);
-  if (!status) sonde_flow_scene_run(*scene, &flow, of->at_s);
-  return status;
-}
-
 static void compare(const sonde_colour_cell *cells, const sonde_colour_value *value,
                     image_colour_result *r) {
   double sum = 0;
@@ -190,7 +160,16 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
                                sonde_error *error) {
   sonde_flow_scene *scene = NULL;
   sonde_colour *colour = NULL;
-  sonde_status status = run_flow(of, s, &scene, error);
+  // The network in the pressed vessels.
+  const sonde_limb *limb = sonde_limb_of(s->model);
+  sonde_flow_def blood = sonde_flow_def_default(limb);
+  sonde_flow flow;
+  if (sonde_limb_pose_of(s->model)) sonde_flow_def_hold(sonde_limb_pose_of(s->model), &blood);
+  if (!isnan(of->squeeze_s)) blood.squeeze_from_s = of->squeeze_s;
+  sonde_status status = sonde_flow_scene_create(limb, s->interior, &scene, error);
+  if (!status) sonde_flow_scene_narrow(scene, &blood);
+  if (!status) status = sonde_flow_start(&blood, &flow, error);
+  if (!status) sonde_flow_scene_run(scene, &flow, of->at_s);
   sonde_colour_cell *cells = calloc(SONDE_COLOUR_CELLS, sizeof *cells);
   uint8_t *pixels = malloc((size_t)image->width * image->height);
   if (!status && !(cells && pixels)) status = app_error(error, SONDE_MEMORY, "out of memory");
@@ -203,7 +182,17 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
   sonde_colour_def def = sonde_colour_def_default();
   def.frequency_hz = fmin(frequency_hz, 5e6), def.seed = seed, def.persistence = 0.5;
   if (!status) {
-    if (isnan(of->steer_rad)) choose_steer(scene, echo, &box, cells);
+    // Steered by 20 degrees to the side on which the blood is faster along the beam.
+    static const double TRY[] = {0, 0.349, -0.349};
+    double best = -1, chosen = box.steer_rad;
+    for (size_t k = 0; k < sizeof TRY / sizeof *TRY && isnan(of->steer_rad); ++k) {
+      double sum = 0;
+      box.steer_rad = TRY[k];
+      sonde_flow_scene_cells(scene, echo, &box, cells);
+      for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) sum += fabs((double)cells[i].towards_m_s);
+      if (sum > 1.3 * best) best = sum, chosen = TRY[k];
+    }
+    box.steer_rad = chosen;
     sonde_flow_scene_cells(scene, echo, &box, cells);
     double fastest = 0.04;
     for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)

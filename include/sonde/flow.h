@@ -10,7 +10,7 @@
 #ifndef SONDE_FLOW_H
 #define SONDE_FLOW_H
 
-#include "sonde/limb.h"
+#include "sonde/limb_pose.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -50,6 +50,10 @@ typedef struct sonde_flow_def {
   /** Tissue whose small veins drain into the segment: it holds blood and takes its share of the
    * inflow. That of the common iliac vein lies in the pelvis, beyond the leg. */
   double tissue_m3[SONDE_FLOW_SEGMENTS];
+  /** Pressure of the column of blood in the position, above that of lying: it widens and tautens
+   * the veins, and does not drive the blood, since it stands in arteries and veins alike. -1e3 to
+   * 3e4 */
+  double column_pa[SONDE_FLOW_SEGMENTS];
   double leak;        /**< what valves leave open to blood that falls back: 0
                            competent to 1 none */
   double inflow_m3_s; /**< through the common femoral artery at rest, > 0; default 350 ml/min */
@@ -62,6 +66,10 @@ typedef struct sonde_flow_def {
 /** Typical veins, or those of a limb when it is not NULL: lengths, areas and companions of its
  * branches, the calf's volume, the inflow of its artery. @thread any */
 SONDE_API sonde_flow_def sonde_flow_def_default(const sonde_limb *limb);
+/** The veins of a limb in a position: columns of blood at the middles of the segments, their
+ * lengths, the popliteal vein as wide as the knee's bend leaves it.
+ * @param[in,out] def as sonde_flow_def_default() of the pose's limb gives it @thread any */
+SONDE_API void sonde_flow_def_hold(const sonde_limb_pose *pose, sonde_flow_def *def);
 
 /** Volumes, flows and valves of the segments: a value, to be copied freely. */
 typedef struct sonde_flow {
@@ -91,7 +99,7 @@ SONDE_API double sonde_flow_area(const sonde_flow *flow, sonde_flow_segment segm
 /** Mean velocity in the open part of a segment's main vein, m/s; 0 when it is closed.
  * @thread any (tick) */
 SONDE_API double sonde_flow_velocity(const sonde_flow *flow, sonde_flow_segment segment);
-/** Pressure in a segment above the atmosphere's, Pa, lying. @thread any (tick) */
+/** Pressure in a segment above the atmosphere's, Pa, with its column. @thread any (tick) */
 SONDE_API double sonde_flow_pressure(const sonde_flow *flow, sonde_flow_segment segment);
 /** Mean velocity in the common femoral artery at a share of the beat: triphasic. @thread any */
 SONDE_API double sonde_flow_artery(double beat);

@@ -6,6 +6,9 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "flow/blood.h"
+#include "interior/law.h"
+#include "limb/pose.h"
+#include "limb/vessels.h"
 
 #include <string.h>
 
@@ -78,24 +81,27 @@ static double take_branch(const sonde_limb *limb, uint32_t branch, double part, 
   return falls / flows * (area_m2[0] * area_m2[0] + area_m2[1] * area_m2[1]);
 }
 
+// The branch that stands for a segment.
+static const struct segment_branch {
+  sonde_flow_segment segment;
+  const char *branch;
+} BRANCH_OF[] = {{SONDE_FLOW_POPLITEAL, "popliteal vein"},
+                 {SONDE_FLOW_FEMORAL, "femoral vein"},
+                 {SONDE_FLOW_COMMON_FEMORAL, "common femoral vein"},
+                 {SONDE_FLOW_EXTERNAL_ILIAC, "external iliac vein"},
+                 {SONDE_FLOW_DEEP_FEMORAL, "deep femoral vein"},
+                 {SONDE_FLOW_GREAT_SAPHENOUS, "great saphenous vein"},
+                 {SONDE_FLOW_CALF, "posterior tibial vein"}};
+
 // Volume of the thigh and the calf in which the typical veins lie.
 static const double typical_m3[2] = {7.5e-3, 2.5e-3};
 
 // The veins of a limb in place of the typical ones.
 static void take_limb(const sonde_limb *limb, sonde_flow_def *def) {
-  static const struct {
-    sonde_flow_segment segment;
-    const char *branch;
-  } OF[] = {{SONDE_FLOW_POPLITEAL, "popliteal vein"},
-            {SONDE_FLOW_FEMORAL, "femoral vein"},
-            {SONDE_FLOW_COMMON_FEMORAL, "common femoral vein"},
-            {SONDE_FLOW_EXTERNAL_ILIAC, "external iliac vein"},
-            {SONDE_FLOW_DEEP_FEMORAL, "deep femoral vein"},
-            {SONDE_FLOW_GREAT_SAPHENOUS, "great saphenous vein"}};
-  for (size_t i = 0; i < SONDE_COUNT_OF(OF); ++i) {
-    const uint32_t branch = sonde_limb_vessel_find(limb, OF[i].branch);
-    if (branch == SONDE_LIMB_NO_VESSEL) continue;
-    const sonde_flow_segment k = OF[i].segment;
+  for (size_t i = 0; i < SONDE_COUNT_OF(BRANCH_OF); ++i) {
+    const uint32_t branch = sonde_limb_vessel_find(limb, BRANCH_OF[i].branch);
+    if (branch == SONDE_LIMB_NO_VESSEL || BRANCH_OF[i].segment == SONDE_FLOW_CALF) continue;
+    const sonde_flow_segment k = BRANCH_OF[i].segment;
     const double part = k == SONDE_FLOW_GREAT_SAPHENOUS ? 0.5 : 1;
     def->narrow[k] = take_branch(limb, branch, part, entering[k] < 1, def->area_m2[k]);
     // Limbs begin within the external iliac vein.
@@ -179,6 +185,32 @@ sonde_flow_def sonde_flow_def_default(const sonde_limb *limb) {
   return def;
 }
 
+void sonde_flow_def_hold(const sonde_limb_pose *pose, sonde_flow_def *def) {
+  SONDE_ASSERT(pose && def);
+  const sonde_limb *limb = pose->limb;
+  const double lying_pa = sonde_posture_pressure(SONDE_POSTURE_SUPINE, SONDE_VESSEL_VEIN, 0);
+  for (size_t i = 0; i < SONDE_COUNT_OF(BRANCH_OF); ++i) {
+    const uint32_t branch = sonde_limb_vessel_find(limb, BRANCH_OF[i].branch);
+    const sonde_flow_segment k = BRANCH_OF[i].segment;
+    if (branch == SONDE_LIMB_NO_VESSEL) continue;
+    const double length_m = sonde_limb_vessel_get(limb, branch).length_m;
+    double pressure_pa = 0, knee = 0;
+    for (int n = 0; n < PLACES; ++n) {
+      const sonde_vec3 rest =
+          sonde_limb_vessel_place(limb, branch, length_m * (n + 0.5) / PLACES).centre_m;
+      pressure_pa += sonde_limb_pose_pressure(pose, sonde_limb_pose_point(pose, rest)) / PLACES;
+      knee += pow(limb_pose_knee(pose, branch, limb_side_point(limb, rest)), 2) / PLACES;
+    }
+    def->column_pa[k] = pressure_pa - lying_pa;
+    def->length_m[k] *= sonde_limb_pose_length(pose, branch) / length_m;
+    for (int v = 0; v < VEINS; ++v) def->area_m2[k][v] *= knee;
+  }
+  // Beyond the leg the column is that of the groin.
+  def->column_pa[SONDE_FLOW_COMMON_ILIAC] =
+      sonde_posture_pressure(limb_pose_posture(pose->setting.position), SONDE_VESSEL_VEIN, 0) -
+      lying_pa;
+}
+
 static double smooth_rise(double t, double from, double length) {
   return isfinite(from) ? smooth_step((t - from) / length) : 0;
 }
@@ -247,16 +279,19 @@ static double resistance(const sonde_flow *flow, uint32_t k, double flow_m3_s) {
                    (open_squares(&flow->def, k) * pow(widening(flow, k), 2));
 }
 
-// What the capillaries of a segment's tissue let into it at a pressure.
+// What the capillaries of a segment's tissue let into it at a pressure without its column. Where
+// the veins are filled the arterioles narrow (Henriksen's veno-arteriolar reflex).
 static double capillaries(const sonde_flow_def *def, uint32_t k, double pressure_pa) {
+  const double reflex = 0.4, from_pa = 10 * SONDE_PA_PER_MMHG, over_pa = 25 * SONDE_PA_PER_MMHG;
+  const double narrowed = reflex * smooth_step((def->column_pa[k] - from_pa) / over_pa);
   double leg = -def->tissue_m3[SONDE_FLOW_COMMON_ILIAC];
   for (int i = 0; i < N; ++i) leg += def->tissue_m3[i];
-  return def->tissue_m3[k] / leg * def->inflow_m3_s *
+  return (1 - narrowed) * def->tissue_m3[k] / leg * def->inflow_m3_s *
          fmax(arterioles_pa - fmax(pressure_pa, held_pa), 0) / (arterioles_pa - held_pa);
 }
 
-// Pressures, volumes and flows that stay without breath and beat. With `sound`, of open veins at
-// the areas of rest, from which the empty volumes follow.
+// Pressures without columns, volumes and flows that stay without breath and beat. With `sound`, of
+// open veins at the areas of rest, lying, from which the empty volumes follow.
 static void settle(sonde_flow *flow, bool sound) {
   enum { PASSES = 200 };
   // Blood comes from the first to the last, pressure back.
@@ -273,7 +308,8 @@ static void settle(sonde_flow *flow, bool sound) {
       pressure[k] +=
           near * (pressure[next[k]] + flow->flow_m3_s[k] * resistance(flow, k, flow->flow_m3_s[k]) -
                   pressure[k]);
-      if (!sound) flow->volume_m3[k] = flow->empty_m3[k] * filling(pressure[k]);
+      if (!sound)
+        flow->volume_m3[k] = flow->empty_m3[k] * filling(pressure[k] + flow->def.column_pa[k]);
     }
   }
   for (uint32_t k = 0; k < N && sound; ++k)
@@ -292,8 +328,8 @@ sonde_status sonde_flow_start(const sonde_flow_def *def, sonde_flow *flow, sonde
     if (!fits)
       return sonde_fail(error, SONDE_ARGUMENT,
                         "%s: expected a length of 5 mm to 2 m, a main vein of 0.2 to 1000 mm2, "
-                        "others of at most 1000 mm2, closed shares of 0 to 1, narrow of 0 to 1000 "
-                        "and tissue of 0 to 100 l",
+                        "others of at most 1000 mm2, closed shares of 0 to 1, narrow of 0 to 1000, "
+                        "tissue of 0 to 100 l and a column of -1 to 30 kPa",
                         sonde_flow_segment_name((sonde_flow_segment)k));
   }
   if (!(def->leak >= 0 && def->leak <= 1))
@@ -312,6 +348,7 @@ sonde_status sonde_flow_start(const sonde_flow_def *def, sonde_flow *flow, sonde
   }
   sonde_flow_def sound = *def;
   memset(sound.closed, 0, sizeof sound.closed);
+  memset(sound.column_pa, 0, sizeof sound.column_pa);
   flow->def = sound;
   settle(flow, true);
   flow->def = *def;
@@ -342,8 +379,8 @@ void sonde_flow_step(sonde_flow *flow, double dt_s) {
   for (uint32_t k = 0; k < N; ++k) {
     double slope;
     inflow[k] = capillaries(def, k,
-                            across(flow->empty_m3[k], flow->volume_m3[k], &slope) +
-                                outside(def, t, (sonde_flow_segment)k));
+                            across(flow->empty_m3[k], flow->volume_m3[k], &slope) -
+                                def->column_pa[k] + outside(def, t, (sonde_flow_segment)k));
     resists[k] = resistance(flow, k, flow->flow_m3_s[k]);
     inertance[k] =
         BLOOD_KG_M3 * entering[k] * def->length_m[k] / (whole_area(def, k) * widening(flow, k));
@@ -360,8 +397,8 @@ void sonde_flow_step(sonde_flow *flow, double dt_s) {
     for (uint32_t k = 0; k < N; ++k) {
       double slope, at = across(flow->empty_m3[k], guess[k], &slope);
       push[k] = slope * (dt_s + wall_s);
-      pressure[k] = at + slope * (flow->volume_m3[k] - guess[k]) + push[k] * inflow[k] +
-                    outside(def, t, (sonde_flow_segment)k);
+      pressure[k] = at - def->column_pa[k] + slope * (flow->volume_m3[k] - guess[k]) +
+                    push[k] * inflow[k] + outside(def, t, (sonde_flow_segment)k);
     }
     pressure[N] = outside(def, t, SONDE_FLOW_SEGMENTS), push[N] = 0;
     for (uint32_t k = 0; k < N; ++k) {

@@ -50,6 +50,7 @@ sonde_status sonde_flow_scene_create(const sonde_limb *limb, const sonde_interio
     return sonde_fail_memory(error);
   }
   s->interior = in, s->all = all;
+  const sonde_limb_pose *pose = limb ? sonde_limb_pose_of(in->model) : NULL;
   for (uint32_t v = 0; v < in->vessel_count; ++v) {
     s->section[v] = all, all += in->course[v].count;
     char name[SONDE_LIMB_VESSEL_NAME];
@@ -62,9 +63,14 @@ sonde_status sonde_flow_scene_create(const sonde_limb *limb, const sonde_interio
       // Models of legs have z downwards; a limb knows each branch's way.
       section->upwards = at->axis.z > 0 ? -1 : 1, section->share = 1;
       if (!limb) continue;
-      const sonde_vec3 point = sonde_limb_to_model(limb, at->rest_m);
+      // Vessels are looked up in the straight limb, their way is that of the position.
+      sonde_vec3 point = sonde_limb_to_model(limb, at->rest_m);
+      if (pose && !sonde_limb_pose_rest(pose, point, &point)) continue;
       const sonde_limb_vessel_near near = sonde_limb_vessel_at(limb, point);
-      const sonde_vec3 distal = sonde_limb_vessel_place(limb, near.vessel, near.arc_m).direction;
+      const sonde_limb_vessel_point place =
+          pose ? sonde_limb_pose_place(pose, near.vessel, near.arc_m)
+               : sonde_limb_vessel_place(limb, near.vessel, near.arc_m);
+      const sonde_vec3 distal = place.direction;
       const sonde_limb_vessel branch = sonde_limb_vessel_get(limb, near.vessel);
       if ((branch.kind == SONDE_LIMB_ARTERY) != (in->course[v].kind == SONDE_VESSEL_ARTERY))
         continue;
