@@ -138,7 +138,7 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
       return app_error(error, SONDE_ARGUMENT,
                        "a decision must be compressible, clot, not_seen or empty");
     pthread_mutex_lock(&app->lock);
-    uint32_t segment = sonde_vein_segment(&app->exam->setup.map, request->id);
+    uint32_t segment = sonde_vein_segment(&app->exam->setups.held[0].map, request->id);
     sonde_status status = sonde_judge_decide(app->exam->judge, segment, decision, error);
     uint64_t tick = app->exam->seen_tick;
     pthread_mutex_unlock(&app->lock);
@@ -154,6 +154,7 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
     pthread_mutex_unlock(&app->lock);
     return put_note(app, SONDE_NOTE_HINT, NULL, 0, tick, error);
   }
+  case SONDE_PAGE_POSITION: return exam_turn(app, request->id, error);
   case SONDE_PAGE_FINISH_EXAM: return exam_finish(app, error);
   case SONDE_PAGE_LEAVE_EXAM: return exam_app_practice(app, error);
   case SONDE_PAGE_LIST_EXAMS: exam_app_tell_exams(app); return SONDE_OK;
@@ -164,7 +165,7 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
       return app_error(error, SONDE_ARGUMENT, "there is no replay to play");
     app->replay->playing = request->playing;
     app->replay->speed = request->speed;
-    app->replay->time_s = sonde_player_time(app->replay->player);
+    app->replay->time_s = exam_replay_time(app->replay);
     app->replay->at_s = app_seconds(CLOCK_MONOTONIC);
     return SONDE_OK;
   default: return exam_app_comment(app, request, error);

@@ -19,10 +19,10 @@ static bool show_progress(double fraction, const char *what, void *user) {
 sonde_status exam_prepare(exam *of, const char *bundled, const char *cases,
                           const sonde_progress *progress, sonde_error *error) {
   assert(of != NULL);
-  sonde_status status = sonde_case_build(&of->patient, bundled, cases, &of->setup, error);
-  if (!status) status = sonde_plan_make(of->protocol, &of->setup.map, &of->plan, error);
-  if (!status) status = sonde_plan_find_targets(&of->plan, &of->setup, progress, error);
-  if (!status) status = sonde_judge_create(&of->setup.map, &of->plan, &of->judge, error);
+  sonde_status status = sonde_exam_prepare(&of->patient, of->protocol, bundled, cases, progress,
+                                           &of->setups, &of->plan, error);
+  if (!status) status = sonde_judge_create(&of->setups.held[0].map, &of->plan, &of->judge, error);
+  of->held = 0, of->part = 1;
   if (!status && !(of->sample = calloc(EXAM_SAMPLES, sizeof *of->sample)))
     status = app_error(error, SONDE_MEMORY, "out of memory");
   return status;
@@ -32,8 +32,37 @@ sonde_status exam_prepare(exam *of, const char *bundled, const char *cases,
 static void watch(void *user, const sonde_frame *frame) {
   exam *of = user;
   pthread_mutex_lock(of->lock);
+  if (of->turns) exam_hold(of, of->turns_to);
   exam_observe(of, frame);
   pthread_mutex_unlock(of->lock);
+}
+
+// The session of a part of the exam, with the probe above the first place of the patient's
+// position, in a thigh above the vein's end at the groin.
+static sonde_status begin_part(exam_app *app, exam *of, uint32_t held, uint32_t part,
+                               sonde_error *error) {
+  char recording[EXAM_PATH], *setup = NULL;
+  const sonde_case_setup *lies = &of->setups.held[held];
+  sonde_status status = exam_setup_text(of, lies->position, &setup, error);
+  if (status) return status;
+  exam_part_path(recording, of->directory, part);
+  sonde_session_def def = app->def.practice;
+  sonde_case_session(lies, &def);
+  def.model_path = of->patient.thigh == SONDE_CASE_BUNDLED ? app->def.model_path : NULL;
+  def.record_path = recording;
+  def.record_setup = setup;
+  def.watch = watch;
+  def.watch_user = of;
+  sonde_vein_point first = sonde_vein_at(&lies->map, 0.0);
+  for (uint32_t i = of->plan.count; i-- > 0 && lies->map.station_count > 0;)
+    if (of->plan.point[i].held == held) first = of->plan.point[i].at;
+  // A strain comes once.
+  const double before_s = sonde_judge_state(of->judge).time_s;
+  def.circulation.valsalva_from_s -= before_s, def.circulation.valsalva_to_s -= before_s;
+  sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
+  status = exam_app_run_session(app, &def, &site, error);
+  sonde_free(setup);
+  return status;
 }
 
 sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_error *error) {
@@ -63,7 +92,7 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
                      "The patient is being prepared: this takes some seconds.");
   const sonde_session *session = app->session;
   // The learner is told nothing before the session is shown.
-  char recording[EXAM_PATH], stamp[32], *setup = NULL;
+  char stamp[32];
   sonde_progress progress = {show_progress, app};
   sonde_status status = exam_prepare(of, exam_app_bundled(app), app->cases, &progress, error);
   app->progress = 0;
@@ -79,22 +108,9 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
     snprintf(of->id, sizeof of->id, "%s-%04x", stamp, mark);
     exam_app_path(of->directory, app->exams, of->id);
     status = sonde_directory_make(of->directory, 0700, false, error);
-    if (!status) status = exam_setup_text(of, &setup, error);
     if (!status) {
-      // The session, with the probe above the vein's end at the groin.
-      exam_app_path(recording, of->directory, "exam.rec");
-      sonde_session_def def = app->def.practice;
-      sonde_case_session(&of->setup, &def);
-      def.model_path = of->patient.thigh == SONDE_CASE_BUNDLED ? app->def.model_path : NULL;
-      def.record_path = recording;
-      def.record_setup = setup;
-      def.watch = watch;
-      def.watch_user = of;
-      sonde_vein_point first = sonde_vein_at(&of->setup.map, 0.0);
-      sonde_site site = {.position_m = first.skin_m, .normal = first.normal, .u = first.across};
       sonde_page_conceal(app->server, true, strcmp(of->guidance, "full") != 0);
-      status = exam_app_run_session(app, &def, &site, error);
-      sonde_free(setup);
+      status = begin_part(app, of, 0, 1, error);
       if (status) sonde_page_conceal(app->server, false, false);
     }
   }
@@ -109,6 +125,40 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
   exam_app_tell_greeting(app);
   exam_app_set_phase(app, EXAM_RUNNING, "");
   return SONDE_OK;
+}
+
+sonde_status exam_turn(exam_app *app, const char *position, sonde_error *error) {
+  exam *of = app->exam;
+  uint32_t held = 0;
+  if (app->phase != EXAM_RUNNING || !of)
+    return app_error(error, SONDE_ARGUMENT, "there is no exam in which the patient could turn");
+  while (held < of->setups.count &&
+         strcmp(sonde_position_key(of->setups.held[held].position), position) != 0)
+    ++held;
+  if (held == of->setups.count)
+    return app_error(error, SONDE_NOT_FOUND, "no place of this exam is in that position");
+  if (held == of->held) return SONDE_OK;
+  if (of->part == EXAM_PARTS)
+    return app_error(error, SONDE_ARGUMENT, "the patient has turned %d times, and stays now",
+                     EXAM_PARTS - 1);
+  // Nothing of the position before is watched from here on; the first image of the new one turns.
+  sonde_session_stop(app->session);
+  pthread_mutex_lock(&app->lock);
+  of->turns = true, of->turns_to = held;
+  pthread_mutex_unlock(&app->lock);
+  sonde_status status = begin_part(app, of, held, of->part + 1, error);
+  if (!status) {
+    of->part++;
+    exam_app_tell_exam(app);
+    return SONDE_OK;
+  }
+  // The patient stays, when the session before is still there.
+  pthread_mutex_lock(&app->lock);
+  of->turns = false;
+  pthread_mutex_unlock(&app->lock);
+  if (app->session) (void)sonde_session_start(app->session, NULL);
+  if (!app->session) (void)exam_app_practice(app, NULL);
+  return status;
 }
 
 // ---- watching
@@ -130,6 +180,15 @@ static void keep_picture(const sonde_frame *frame, double vein, exam_picture *pi
   image->height_m = frame->height_m;
   image->tick = frame->snapshot.tick;
   picture->vein_ratio = vein;
+}
+
+void exam_hold(exam *of, uint32_t held) {
+  assert(of->judge && held < of->setups.count);
+  (void)sonde_judge_hold(of->judge, held, &of->setups.held[held].map);
+  sonde_judge_compressions(of->judge, &of->presses_seen); // one that it ended has no pictures
+  sonde_image_clear(&of->open.image);
+  sonde_image_clear(&of->closed.image);
+  of->held = held, of->turns = false;
 }
 
 void exam_observe(exam *of, const sonde_frame *frame) {
@@ -162,9 +221,9 @@ void exam_observe(exam *of, const sonde_frame *frame) {
   }
 
   // Force and area of the vein, ten times a second.
-  if (n == EXAM_SAMPLES || (n && s->time_s - of->sample[n - 1].time_s < 0.1)) return;
+  if (n == EXAM_SAMPLES || (n && now.time_s - of->sample[n - 1].time_s < 0.1)) return;
   of->sample[of->sample_count++] =
-      (sonde_exam_sample){s->time_s, s->force_normal_n, now.vein_ratio};
+      (sonde_exam_sample){now.time_s, s->force_normal_n, now.vein_ratio};
 }
 
 // ---- the end
@@ -195,6 +254,6 @@ void exam_destroy(exam *of) {
   free(of->sample);
   free(of->comments.list);
   sonde_judge_destroy(of->judge);
-  sonde_case_setup_clear(&of->setup);
+  sonde_exam_setups_clear(&of->setups);
   free(of);
 }

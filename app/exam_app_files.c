@@ -44,7 +44,7 @@ sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
       sonde_log_entry *earlier = NULL;
       sonde_exam_report report = {.patient = &of->patient,
                                   .protocol = of->protocol,
-                                  .map = &of->setup.map,
+                                  .map = &of->setups.held[0].map,
                                   .plan = &of->plan,
                                   .score = &of->score,
                                   .note = note_of(of),
@@ -107,7 +107,8 @@ sonde_status exam_note_text(const char *const (*texts)[2], size_t count, char **
 }
 
 // The case as it was, so that a replay does not depend on the library of cases.
-sonde_status exam_setup_text(const exam *of, char **text, sonde_error *error) {
+sonde_status exam_setup_text(const exam *of, sonde_limb_position position, char **text,
+                             sonde_error *error) {
   char *patient = NULL;
   *text = NULL;
   sonde_status status = sonde_case_text(&of->patient, &patient, error);
@@ -119,6 +120,7 @@ sonde_status exam_setup_text(const exam *of, char **text, sonde_error *error) {
                                   {"protocol", of->protocol->id},
                                   {"guidance", of->guidance},
                                   {"date", of->date},
+                                  {"position", sonde_position_key(position)},
                                   {"patient", patient}};
   status = exam_note_text(texts, sizeof texts / sizeof texts[0], text, error);
   sonde_free(patient);

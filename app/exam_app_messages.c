@@ -116,12 +116,23 @@ void exam_app_tell_greeting(exam_app *app) {
 
 // ---- exam
 
-// The press under way, the segments, and the newest presses.
+// How the patient lies, the press under way, the segments, and the newest presses.
 static void put_findings(sonde_json_out *out, const exam *of, bool shown) {
   enum { MOST = 200 };
   uint32_t count;
-  const sonde_vein_map *map = &of->setup.map;
+  const sonde_vein_map *map = &of->setups.held[of->held].map;
   const sonde_compression *press = sonde_judge_compressions(of->judge, &count);
+  const uint32_t lies = of->turns ? of->turns_to : of->held;
+  sonde_json_put_text(out, "position", sonde_position_key(of->setups.held[lies].position));
+  sonde_json_begin_list(out, "positions");
+  for (uint32_t k = 0; k < of->setups.count; ++k) {
+    const sonde_limb_position position = of->setups.held[k].position;
+    sonde_json_begin_object(out, NULL);
+    sonde_json_put_text(out, "id", sonde_position_key(position));
+    sonde_json_put_text(out, "title", sonde_position_title(position));
+    sonde_json_end(out);
+  }
+  sonde_json_end(out);
   if (shown) {
     sonde_judge_now now = sonde_judge_state(of->judge);
     sonde_json_begin_object(out, "compression");
@@ -226,12 +237,13 @@ void exam_app_tell_exam(exam_app *app) {
   sonde_guidance g = {.offset_m = (double)NAN};
   if (of) g = sonde_judge_guidance(of->judge);
   bool shown = of && (full || hinted), silent = !of || strcmp(of->guidance, "exam") == 0;
-  bool asked = !silent && g.undecided < of->setup.map.segment_count;
+  bool asked = !silent && g.undecided < of->setups.held[0].map.segment_count;
   sonde_json_begin_object(&out, "step");
   sonde_json_put_text(&out, "text", silent ? "" : g.text);
   sonde_json_put_text(&out, "detail", shown || asked ? g.detail : "");
-  sonde_json_put_text(&out, "segment", asked ? of->setup.map.segment[g.undecided].name : "");
-  if (shown && g.point < of->plan.count) {
+  sonde_json_put_text(&out, "segment",
+                      asked ? of->setups.held[0].map.segment[g.undecided].name : "");
+  if (shown && g.point < of->plan.count && !g.turn) {
     const sonde_plan_point *point = &of->plan.point[g.point];
     sonde_json_begin_object(&out, "target");
     sonde_json_put_text(&out, "name", point->title);
@@ -247,6 +259,8 @@ void exam_app_tell_exam(exam_app *app) {
     put_reals(&out, "force_n", (double[]){g.force.firm_n, g.force.limit_n}, 2);
   else
     put_null(&out, "force_n");
+  sonde_json_put_text(&out, "position",
+                      shown && g.turn ? sonde_position_key(of->plan.point[g.point].position) : "");
   put_rounded(&out, "offset_mm", shown ? g.offset_m * 1e3 : (double)NAN, 1);
   put_rounded(&out, "angle_deg", shown ? g.angle_rad * DEGREES : (double)NAN, 1);
   sonde_json_put_bool(&out, "angle_ok", shown && g.angle_ok);
@@ -319,8 +333,8 @@ void exam_app_tell_replay(exam_app *app) {
   if (!replay || app->phase != EXAM_REPLAY || !begin(&out, "replay")) return;
   sonde_json_put_text(&out, "exam", replay->id);
   sonde_json_put_text(&out, "title", replay->title);
-  put_rounded(&out, "duration_s", sonde_player_info(replay->player)->duration_s, 0.001);
-  put_rounded(&out, "time_s", sonde_player_time(replay->player), 0.001);
+  put_rounded(&out, "duration_s", exam_replay_length(replay), 0.001);
+  put_rounded(&out, "time_s", exam_replay_time(replay), 0.001);
   sonde_json_put_bool(&out, "playing", replay->playing);
   put_rounded(&out, "speed", replay->speed, 0.01);
   sonde_json_begin_list(&out, "presses");

@@ -13,7 +13,8 @@ enum {
   EXAM_REQUESTS = 64,
   EXAM_PICTURES = 64,
   EXAM_SAMPLES = 36000,
-  EXAM_SENTENCE = 240
+  EXAM_SENTENCE = 240,
+  EXAM_PARTS = 32 // of a recording, one for each time that the patient lies otherwise
 };
 
 typedef enum exam_phase {
@@ -37,7 +38,8 @@ typedef struct exam {
   sonde_case patient;
   const sonde_exam_protocol *protocol;
   char guidance[16];
-  sonde_case_setup setup;
+  sonde_exam_setups setups;
+  uint32_t part; // of the recording, from 1
   sonde_plan plan;
   sonde_judge *judge; // under the lock
   bool scored;
@@ -48,7 +50,9 @@ typedef struct exam {
   double retry_s;                        // clock of the next attempt to write
   pthread_mutex_t *lock;                 // the application's
   // under the lock
-  uint64_t seen_tick; // of the last image that the judge saw
+  uint32_t held, turns_to; // setup in whose position the patient is; is from the next image on
+  bool turns;
+  uint64_t seen_tick; // of the last image that the judge saw, in this part
   uint32_t picture_count, presses_seen;
   sonde_exam_picture picture[EXAM_PICTURES]; // owned here
   exam_picture open, closed;                 // of the press under way
@@ -68,10 +72,18 @@ typedef struct exam_recovered {
   char worst[EXAM_SENTENCE]; // why the last unreadable one is
 } exam_recovered;
 
+// A part of a kept exam: which setup it is of, and its time in the exam.
+typedef struct exam_replay_part {
+  uint32_t held;
+  double start_s, length_s;
+} exam_replay_part;
+
 typedef struct exam_replay {
-  char id[64], title[96], recording[EXAM_PATH];
-  sonde_case_setup setup;
-  sonde_player *player;
+  char id[64], title[96], directory[EXAM_PATH];
+  sonde_exam_setups setups;
+  uint32_t part_count, part; // the one that plays, from 0
+  exam_replay_part parts[EXAM_PARTS];
+  sonde_player *player; // of that part
   sonde_comments comments;
   sonde_json *result; // the exam's data; NULL: none
   bool playing;
@@ -129,12 +141,25 @@ void exam_app_tell_exam(exam_app *app);
 void exam_app_tell_exams(exam_app *app);
 void exam_app_tell_replay(exam_app *app);
 
+// exam_app_parts.c: parts of an exam's recording, counted from 1.
+const char *exam_part_path(char path[EXAM_PATH], const char *directory, uint32_t part);
+uint32_t exam_part_count(const char *directory);
+// What the setup of a part says; false: nothing.
+bool exam_part_position(const char *directory, uint32_t part, sonde_limb_position *position);
+// The comments of all parts, as sonde_comments_load().
+sonde_status exam_part_comments(const char *directory, sonde_comments *comments,
+                                sonde_error *error);
+
 // exam_app_exam.c: an exam from its start to its score.
 // Thigh, plan and judge of a case that the exam has.
 sonde_status exam_prepare(exam *of, const char *bundled, const char *cases,
                           const sonde_progress *progress, sonde_error *error);
 sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_error *error);
-void exam_observe(exam *of, const sonde_frame *frame); // under the lock
+// The patient takes another position of the protocol; presses and findings stay.
+sonde_status exam_turn(exam_app *app, const char *position, sonde_error *error);
+void exam_observe(exam *of, const sonde_frame *frame); // under the lock, as the next one
+// What is observed from now on is of another setup's position.
+void exam_hold(exam *of, uint32_t held);
 sonde_status exam_finish(exam_app *app, sonde_error *error);
 // The session must be gone.
 void exam_destroy(exam *of);
@@ -144,7 +169,8 @@ void exam_destroy(exam *of);
 sonde_status exam_note_text(const char *const (*texts)[2], size_t count, char **text,
                             sonde_error *error);
 // The text of the journal's note that says what the exam is about; freed by sonde_free().
-sonde_status exam_setup_text(const exam *of, char **text, sonde_error *error);
+sonde_status exam_setup_text(const exam *of, sonde_limb_position position, char **text,
+                             sonde_error *error);
 // Writes what is missing of the files and the log's row.
 sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error);
 // Brings an exam that is over to the disk, as far as the disk takes it; later turns try again.
@@ -164,6 +190,9 @@ sonde_json *exam_read_setup(const char *recording);
 // exam_app_replay.c: any moment of a kept exam, played, with comments.
 sonde_status exam_replay_open(exam_app *app, const char *id, sonde_error *error);
 void exam_replay_turn(exam_app *app);
+// Of the exam: its length, and where the replay is, s.
+double exam_replay_length(const exam_replay *replay);
+double exam_replay_time(const exam_replay *replay);
 sonde_status exam_replay_seek(exam_app *app, double time_s, sonde_error *error);
 // To the replay that is shown, or to the exam that runs, at its present time.
 sonde_status exam_app_comment(exam_app *app, const sonde_page_request *request, sonde_error *error);

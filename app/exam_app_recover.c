@@ -86,12 +86,17 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   bool recorded = exists(directory, "exam.rec");
   if (recorded)
     status = sonde_notes_load(exam_app_path(path, directory, "exam.rec"), &notes, &error);
+  // An exam was finished in its last part.
+  const uint32_t parts = exam_part_count(directory);
+  sonde_notes last = {0};
+  if (!status && parts > 1)
+    (void)sonde_notes_load(exam_part_path(path, directory, parts), &last, NULL);
   if (!old && never_began(path, status)) {
     found->never_began++;
     return false;
   }
   const sonde_note *setup = sonde_notes_last(&notes, SONDE_NOTE_SETUP);
-  const sonde_note *score = sonde_notes_last(&notes, SONDE_NOTE_SCORE);
+  const sonde_note *score = sonde_notes_last(parts > 1 ? &last : &notes, SONDE_NOTE_SCORE);
   sonde_json *root = setup ? parse(setup->text) : NULL;
   if (!root && !sonde_file_load(exam_app_path(path, directory, "start.json"), &text, &size, NULL))
     root = parse(text);
@@ -114,6 +119,7 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   sonde_free(text);
   sonde_json_free(root);
   sonde_notes_clear(&notes);
+  sonde_notes_clear(&last);
   return known;
 }
 
@@ -132,7 +138,10 @@ void exam_recover_log(const char *exams, sonde_exam_log *log, exam_recovered *fo
     if (id[0] == '.' || (!exists(directory, "exam.rec") && !exists(directory, "start.json")))
       continue;
     found->exams++;
-    if (sonde_recording_is_open(exam_app_path(path, directory, "exam.rec"))) {
+    bool open = sonde_recording_is_open(exam_app_path(path, directory, "exam.rec"));
+    for (uint32_t part = exam_part_count(directory); part > 1 && !open; --part)
+      open = sonde_recording_is_open(exam_part_path(path, directory, part));
+    if (open) {
       found->running++;
       continue;
     }
@@ -151,9 +160,9 @@ void exam_recover_log(const char *exams, sonde_exam_log *log, exam_recovered *fo
 
 // ---- result and report --------------------------------------------------------------------------
 
-// The exam as its setup tells it, prepared, with the comments of its recording.
+// The exam as its setup tells it, prepared, with the comments of its recordings.
 static sonde_status fill(exam *of, const sonde_json *setup, const exam_places *places,
-                         sonde_exam_protocol *protocol, const char *recording, sonde_error *error) {
+                         sonde_exam_protocol *protocol, sonde_error *error) {
   assert(of && places);
   char name[48];
   sonde_exam_protocol *all = NULL;
@@ -177,7 +186,7 @@ static sonde_status fill(exam *of, const sonde_json *setup, const exam_places *p
   if (!status) status = exam_prepare(of, places->bundled, places->cases, NULL, error);
 
   sonde_comments found = {0};
-  if (!status) status = sonde_comments_load(recording, &found, error);
+  if (!status) status = exam_part_comments(of->directory, &found, error);
   if (!status && found.count) {
     size_t bytes = found.count * sizeof *found.list;
     of->comments.list = malloc(bytes);
@@ -198,52 +207,64 @@ static void apply_note(exam *of, const sonde_note *note) {
   copy_member(root, "decision", word, sizeof word);
   sonde_json_free(root);
   if (sonde_decision_parse(word, &decision))
-    (void)sonde_judge_decide(of->judge, sonde_vein_segment(&of->setup.map, segment), decision,
-                             NULL);
+    (void)sonde_judge_decide(of->judge, sonde_vein_segment(&of->setups.held[0].map, segment),
+                             decision, NULL);
 }
 
 static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *log, bool *derived,
                            sonde_error *error) {
   assert(of && log && derived);
   char path[EXAM_PATH];
-  sonde_notes notes;
+  sonde_notes notes, last = {0};
   sonde_exam_protocol protocol;
   sonde_log_entry told;
   sonde_status status =
       sonde_notes_load(exam_app_path(path, of->directory, "exam.rec"), &notes, error);
   if (status) return never_began(path, status) ? SONDE_OK : status;
+  const uint32_t parts = exam_part_count(of->directory);
+  if (parts > 1) (void)sonde_notes_load(exam_part_path(path, of->directory, parts), &last, NULL);
   const sonde_note *setup = sonde_notes_last(&notes, SONDE_NOTE_SETUP);
-  const sonde_note *score = sonde_notes_last(&notes, SONDE_NOTE_SCORE);
+  const sonde_note *score = sonde_notes_last(parts > 1 ? &last : &notes, SONDE_NOTE_SCORE);
   sonde_json *root = setup && score ? parse(setup->text) : NULL;
   if (root) { // an interrupted exam has no result
-    status = fill(of, root, places, &protocol, path, error);
-    if (!status) {
-      // Image by image as the exam was judged, each note after the last image before it.
+    status = fill(of, root, places, &protocol, error);
+    // Part by part, image by image as the exam was judged, each note after the last image before
+    // it.
+    for (uint32_t part = 1; part <= parts && !status; ++part) {
+      sonde_limb_position position;
+      sonde_notes said = {0};
       sonde_player *player = NULL;
-      sonde_player_def def = {.path = path,
-                              .model = of->setup.model,
-                              .findings = &of->setup.findings,
+      sonde_frame frame;
+      uint32_t held = 0, next = 0;
+      if (exam_part_position(of->directory, part, &position)) // else from before positions
+        while (held < of->setups.count && of->setups.held[held].position != position) ++held;
+      if (held == of->setups.count)
+        status = app_error(error, SONDE_MISMATCH, "%.300s: %s is no position of the protocol",
+                           of->directory, sonde_position_key(position));
+      if (status) break;
+      if (part > 1) exam_hold(of, held);
+      sonde_player_def def = {.path = exam_part_path(path, of->directory, part),
+                              .model = of->setups.held[held].model,
+                              .findings = &of->setups.held[held].findings,
                               .recover = true,
                               .no_cache = true};
       sonde_progress progress = app_progress();
-      status = sonde_player_open(&def, &player, error);
-      uint32_t next = 0;
-      sonde_frame frame;
-      bool cancelled = false;
-      while (!status && !cancelled && sonde_player_next_image(player, true)) {
+      status = sonde_notes_load(path, &said, error);
+      if (!status) status = sonde_player_open(&def, &player, error);
+      while (!status && sonde_player_next_image(player, true)) {
         if (!sonde_player_frame(player, &frame)) continue;
-        while (next < notes.count && notes.list[next].tick < frame.snapshot.tick)
-          apply_note(of, &notes.list[next++]);
+        while (next < said.count && said.list[next].tick < frame.snapshot.tick)
+          apply_note(of, &said.list[next++]);
         exam_observe(of, &frame);
-        double length_s = sonde_player_info(player)->duration_s;
-        cancelled = !progress.report(sonde_player_time(player) / fmax(length_s, 1e-3), of->id,
-                                     progress.user);
+        double share =
+            sonde_player_time(player) / fmax(sonde_player_info(player)->duration_s, 1e-3);
+        if (!progress.report(share, of->id, progress.user))
+          status = app_error(error, SONDE_CANCELLED, "cancelled in exam %s", of->id);
       }
-      while (next < notes.count) apply_note(of, &notes.list[next++]);
+      while (next < said.count) apply_note(of, &said.list[next++]);
       app_progress_end();
       sonde_player_close(player);
-      status =
-          cancelled ? app_error(error, SONDE_CANCELLED, "cancelled in exam %s", of->id) : status;
+      sonde_notes_clear(&said);
     }
     if (!status) {
       sonde_judge_finish(of->judge);
@@ -262,6 +283,7 @@ static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *
   }
   sonde_json_free(root);
   sonde_notes_clear(&notes);
+  sonde_notes_clear(&last);
   return status;
 }
 

@@ -179,13 +179,12 @@ int exam_compare(const compare_options *options) {
   for (uint32_t of = 0; of < t.case_count && !status; ++of) {
     // One case: its thigh once, then every operator and seed.
     const compare_options *o = t.o;
-    sonde_case_setup setup;
+    sonde_exam_setups setups;
     sonde_plan plan;
     const char *bundled = o->library->has_bundled ? o->library->bundled : NULL;
-    status = sonde_case_build(&t.cases[of], bundled, o->library->cases, &setup, &error);
+    status = sonde_exam_prepare(&t.cases[of], o->protocol, bundled, o->library->cases, &progress,
+                                &setups, &plan, &error);
     if (!status) {
-      status = sonde_plan_make(o->protocol, &setup.map, &plan, &error);
-      if (!status) status = sonde_plan_find_targets(&plan, &setup, &progress, &error);
       for (uint32_t op = 0; op < OPERATORS && !status; ++op)
         for (long seed = 0; seed < o->seeds && !status; ++seed) {
           char json[PATH_SIZE], csv[PATH_SIZE];
@@ -208,9 +207,9 @@ int exam_compare(const compare_options *options) {
             def.json_path = json;
             def.csv_path = csv;
           }
-          status = sonde_exam_run(&def, &setup, &progress, cell(&t, of, op, seed), &error);
+          status = sonde_exam_run(&def, &setups, &progress, cell(&t, of, op, seed), &error);
         }
-      sonde_case_setup_clear(&setup);
+      sonde_exam_setups_clear(&setups);
     }
   }
   app_progress_end();

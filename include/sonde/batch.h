@@ -7,7 +7,7 @@
 #define SONDE_BATCH_H
 
 #include "sonde/echo_scanner.h"
-#include "sonde/trainer.h"
+#include "sonde/trainer_setup.h"
 
 #ifdef __cplusplus
 extern "C" {

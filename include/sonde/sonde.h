@@ -51,6 +51,7 @@
 #include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"
 #include "sonde/trainer.h"
+#include "sonde/trainer_setup.h"
 #include "sonde/trainer_protocol.h"
 #include "sonde/trainer_judge.h"
 #include "sonde/trainer_operator.h"

@@ -29,6 +29,7 @@ typedef enum sonde_page_ask {
   SONDE_PAGE_START_EXAM, /**< id (case), protocol, guidance, name (trainee) */
   SONDE_PAGE_DECIDE,     /**< id (segment), text (decision) */
   SONDE_PAGE_HINT,
+  SONDE_PAGE_POSITION, /**< id (position) */
   SONDE_PAGE_FINISH_EXAM,
   SONDE_PAGE_LEAVE_EXAM,
   SONDE_PAGE_LIST_EXAMS,

@@ -179,7 +179,8 @@ typedef struct sonde_case {
   uint64_t seed;
   sonde_thigh known;            /**< parameters that are not drawn */
   sonde_limb_body leg;          /**< the same of a limb */
-  sonde_limb_position position; /**< of the leg; SONDE_LIMB_POSITIONS: straight, lying */
+  sonde_limb_position position; /**< of the leg at first; SONDE_LIMB_POSITIONS: straight, lying */
+  uint32_t positions;           /**< a bit for each that the patient can take beside it */
   char model[256];
   sonde_circulation circulation;
   sonde_pathology pathology; /**< of the femoral vein; extent below */
@@ -220,29 +221,13 @@ SONDE_API sonde_status sonde_case_list(const char *directory, sonde_case **cases
  *  case. @thread any */
 SONDE_API void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out);
 
-/** A case on its thigh. */
-typedef struct sonde_case_setup {
-  sonde_model *model; /**< owned */
-  sonde_vein_map map;
-  sonde_pathology pathology;
-  sonde_findings findings;
-  sonde_circulation circulation;
-} sonde_case_setup;
-
-/** Loads or makes the thigh, places everything on it and checks the truth against it.
- *  @param bundled path of the bundled model; may be NULL when the case does not use it
- *  @param directory of the case file, for model paths; NULL: the working directory
- *  @param[out] setup released by sonde_case_setup_clear()
- *  @return MISMATCH when the truth calls a segment what its vein is not; NOT_FOUND, ARGUMENT naming
- *    the place; what loading or making the model says
- *  @thread owner */
-SONDE_API sonde_status sonde_case_build(const sonde_case *from, const char *bundled,
-                                        const char *directory, sonde_case_setup *setup,
-                                        sonde_error *error);
-SONDE_API void sonde_case_setup_clear(sonde_case_setup *setup); /**< @thread owner */
-/** Model, pathology, findings, posture and circulation of a session; the setup must outlive it.
- *  @thread owner */
-SONDE_API void sonde_case_session(const sonde_case_setup *setup, sonde_session_def *def);
+/** Whether the patient can take a position: the first one, or one that a leg's case allows. A case
+ *  whose circulation has a posture keeps to it. @thread any */
+SONDE_API bool sonde_case_takes(const sonde_case *of, sonde_limb_position position);
+/** Key of a position in files, e.g. "prone_bent"; SONDE_LIMB_POSITIONS: "straight". @thread any */
+SONDE_API const char *sonde_position_key(sonde_limb_position position);
+/** What the patient does in a position, e.g. "prone, the knee bent". @thread any */
+SONDE_API const char *sonde_position_title(sonde_limb_position position);
 
 #ifdef __cplusplus
 }

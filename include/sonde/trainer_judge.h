@@ -33,8 +33,9 @@ typedef struct sonde_compression {
   uint32_t point;      /**< nearest of the plan within reach; SONDE_PLAN_POINTS: none */
   uint32_t place;      /**< nearest of the plan, in reach or not: its force target applies */
   uint64_t examined;   /**< a bit per place of the plan that it examined */
-  double z_m, along_m; /**< where the image plane cut the vein when it began; along the main vein,
-                            NaN when the press shows nothing of that one */
+  double z_m, along_m; /**< where the image plane cut the vein when it began, in the frame of its
+                            position; along the main vein as the first setup has it, NaN when the
+                            press shows nothing of that one */
   double force_peak_n;
   double vein_ratio, artery_ratio; /**< least of the vein; the artery's at the same time */
   double artery_least;
@@ -54,7 +55,8 @@ SONDE_API const char *sonde_press_state_name(sonde_press_state state);
 
 typedef struct sonde_judge sonde_judge;
 
-/** @param map,plan copied @param[out] judge released by sonde_judge_destroy() @thread owner */
+/** @param map of the first setup of the plan; copied, as the plan is
+ *  @param[out] judge released by sonde_judge_destroy() @thread owner */
 SONDE_API sonde_status sonde_judge_create(const sonde_vein_map *map, const sonde_plan *plan,
                                           sonde_judge **judge, sonde_error *error);
 SONDE_API void sonde_judge_destroy(sonde_judge *judge); /**< @thread owner */
@@ -66,6 +68,10 @@ SONDE_API void sonde_judge_destroy(sonde_judge *judge); /**< @thread owner */
 SONDE_API bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot);
 /** Ends a press under way. @thread owner */
 SONDE_API bool sonde_judge_finish(sonde_judge *judge);
+/** The patient has taken another position: what is fed from now on is of that setup, in its frame,
+ *  its time counted from 0. Ends a press under way; presses, places and decisions stay.
+ *  @param map of setup `held`, copied @return false as sonde_judge_feed() @thread owner */
+SONDE_API bool sonde_judge_hold(sonde_judge *judge, uint32_t held, const sonde_vein_map *map);
 
 /** Finished presses; valid until the next feed. @thread owner */
 SONDE_API const sonde_compression *sonde_judge_compressions(const sonde_judge *judge,
@@ -95,6 +101,7 @@ SONDE_API sonde_status sonde_judge_decide(sonde_judge *judge, uint32_t segment,
 /** What to do next, for guidance and hints. */
 typedef struct sonde_guidance {
   uint32_t point;              /**< of the plan; SONDE_PLAN_POINTS when all are done */
+  bool turn;                   /**< it is in another position than the patient's */
   char text[160], detail[256]; /**< what to do; how, or what comes then */
   double offset_m;             /**< of the probe's face from the target along the skin */
   double angle_rad;            /**< of the image plane from transverse there */

@@ -28,6 +28,15 @@ SONDE_API sonde_status sonde_operator_create(const char *name, uint64_t seed,
 SONDE_API void sonde_operator_destroy(sonde_operator *op); /**< @thread owner */
 /** Shows the newest snapshot: the operator moves on. @thread owner, while no tick runs */
 SONDE_API void sonde_operator_see(sonde_operator *op, const sonde_snapshot *snapshot);
+/** The setup in whose position the operator wants the patient next. Until sonde_operator_hold() has
+ *  put him there the operator does nothing. @thread owner */
+SONDE_API uint32_t sonde_operator_wants(const sonde_operator *op);
+/** The patient is in that position now: the hand comes to the next place anew, with another device.
+ *  @param map of setup `held`, copied @param device filled as by sonde_operator_create() and taken
+ *  in the place of that one, which may be gone @return MEMORY @thread owner */
+SONDE_API sonde_status sonde_operator_hold(sonde_operator *op, uint32_t held,
+                                           const sonde_vein_map *map, double dt_s,
+                                           sonde_device *device, sonde_error *error);
 /** Whether the exam is over for the operator. @thread owner */
 SONDE_API bool sonde_operator_done(const sonde_operator *op);
 /** What the operator thinks of a segment of the map. @thread owner */
@@ -37,8 +46,8 @@ SONDE_API sonde_decision sonde_operator_decision(const sonde_operator *op, uint3
 typedef struct sonde_exam_def {
   const sonde_case *patient;
   const sonde_exam_protocol *protocol;
-  const sonde_plan *plan;    /**< of the protocol on the setup's thigh with its targets, borrowed;
-                                  NULL: made and its targets found for this exam */
+  const sonde_plan *plan;    /**< of the protocol on the setups with its targets, borrowed; NULL:
+                                  that of the first setup's position with targets of its own */
   const char *operator_name; /**< default expert */
   uint64_t seed;             /**< of the operator's hand */
   const char *bundled;       /**< path of the bundled model */
@@ -50,11 +59,12 @@ typedef struct sonde_exam_def {
 } sonde_exam_def;
 SONDE_API sonde_exam_def sonde_exam_def_default(void); /**< @thread any */
 
-/** Builds the case, lets the operator examine it in lockstep, judges.
- *  @param setup of this case, borrowed; NULL: built for this exam
+/** Builds the case, lets the operator examine it in lockstep, judges. The patient turns when the
+ *  operator asks for it.
+ *  @param setups of this case for the protocol, borrowed; NULL: built for this exam
  *  @return what building says, CANCELLED, CONVERGENCE when the operator found no end @thread owner
  */
-SONDE_API sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_case_setup *setup,
+SONDE_API sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_exam_setups *setups,
                                       const sonde_progress *progress, sonde_score *score,
                                       sonde_error *error);
 

@@ -5,7 +5,7 @@
 #ifndef SONDE_TRAINER_PROTOCOL_H
 #define SONDE_TRAINER_PROTOCOL_H
 
-#include "sonde/trainer.h"
+#include "sonde/trainer_setup.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -39,7 +39,8 @@ typedef struct sonde_exam_stop {
   char needs[32];   /**< branch of the thigh without which the place is left out; empty: none */
   char segment[32]; /**< whose finding a station is for; empty: the station's own */
   sonde_station from, to;
-  double every_m; /**< 0: one place, `from` */
+  double every_m;               /**< 0: one place, `from` */
+  sonde_limb_position position; /**< to be examined in; SONDE_LIMB_POSITIONS: as the patient lies */
 } sonde_exam_stop;
 
 typedef struct sonde_exam_protocol {
@@ -62,9 +63,12 @@ SONDE_API sonde_status sonde_exam_protocol_list(const char *directory,
 /** A place of the exam on one thigh. */
 typedef struct sonde_plan_point {
   char title[64], text[256];
-  uint32_t segment;    /**< of the map: its veins must close */
+  uint32_t held; /**< setup of the exam in whose position it is; the place is in its frame */
+  sonde_limb_position position; /**< that of the setup */
+  uint32_t segment;             /**< of the map: its veins must close */
   bool station;        /**< of the limb: the probe stands as there, not straight above the vein */
   sonde_vein_point at; /**< of another vein than the main one without along_m (NaN) */
+  double course_m;     /**< along_m where the first setup has that place of the vein */
   sonde_force_target target; /**< NaN before sonde_plan_find_targets() */
 } sonde_plan_point;
 
@@ -75,8 +79,8 @@ typedef struct sonde_plan {
   sonde_plan_point point[SONDE_PLAN_POINTS]; /**< in the order of the exam */
 } sonde_plan;
 
-/** The places, without their forces. A place that needs a branch which the thigh has not is left
- *  out.
+/** The places, without their forces, all in the position of the map. A place that needs a branch
+ *  which the thigh has not is left out.
  *  @return NOT_FOUND for a place or a vein there that the leg has not; ARGUMENT for more than
  * SONDE_PLAN_POINTS or none at all
  *  @thread any */
@@ -84,18 +88,39 @@ SONDE_API sonde_status sonde_plan_make(const sonde_exam_protocol *protocol,
                                        const sonde_vein_map *map, sonde_plan *plan,
                                        sonde_error *error);
 
-/** Finds the force of every place by pressing a healthy vein there: the case's thigh, posture and
- *  oedema, the linear probe straight above the vein at 12 mm/s, the inside by finite elements as in
- * a session; no clot, breath or strain. Places of one station share the force that closes the veins
- * of all of them. About 2 s of a core's time for each place in a limb.
- *  @param setup of the case whose map the plan was made with
+/** Finds the force of every place by pressing a healthy vein there: thigh and posture of the
+ * place's setup, its oedema, the linear probe straight above the vein at 12 mm/s, the inside by
+ * finite elements as in a session; no clot, breath or strain. Places of one station share the force
+ * that closes the veins of all of them. About 2 s of a core's time for each place in a limb.
+ *  @param setup [as many as the places name] of the case, with whose maps the plan was made
  *  @return MISMATCH for a place where the healthy vein does not close at 60 N, or 60 mm deep;
  *    CANCELLED; MEMORY @thread owner */
 SONDE_API sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *setup,
                                                const sonde_progress *progress, sonde_error *error);
-/** The place of the plan whose skin is nearest to a probe's face, in reach or not; of places at one
- * station the first; SONDE_PLAN_POINTS when the plan is empty. @thread any */
-SONDE_API uint32_t sonde_plan_nearest(const sonde_plan *plan, sonde_vec3 face_m);
+/** The place of the plan in a setup's position whose skin is nearest to a probe's face, in reach or
+ * not; of places at one station the first; SONDE_PLAN_POINTS when there is none. @thread any */
+SONDE_API uint32_t sonde_plan_nearest(const sonde_plan *plan, uint32_t held, sonde_vec3 face_m);
+
+enum { SONDE_EXAM_SETUPS = 4 };
+/** A case in the positions that an exam needs, in the order of its places: a model each, of the
+ * same leg with the same findings. */
+typedef struct sonde_exam_setups {
+  uint32_t count;
+  sonde_case_setup held[SONDE_EXAM_SETUPS];
+} sonde_exam_setups;
+
+/** The case in every position that the protocol's places ask for and the patient can take (a place
+ *  that asks for another is examined as the patient lies at first), and the plan with its forces.
+ *  About 1.5 s of a core's time for each position beside that of sonde_plan_find_targets().
+ *  @param bundled,directory as of sonde_case_build()
+ *  @param[out] setups released by sonde_exam_setups_clear()
+ *  @return as sonde_case_build(), sonde_plan_make(), sonde_plan_find_targets() @thread owner */
+SONDE_API sonde_status sonde_exam_prepare(const sonde_case *from,
+                                          const sonde_exam_protocol *protocol, const char *bundled,
+                                          const char *directory, const sonde_progress *progress,
+                                          sonde_exam_setups *setups, sonde_plan *plan,
+                                          sonde_error *error);
+SONDE_API void sonde_exam_setups_clear(sonde_exam_setups *setups); /**< @thread owner */
 
 #ifdef __cplusplus
 }

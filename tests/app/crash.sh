@@ -10,7 +10,18 @@ shift || true
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 tried=0 lost=0 wrong=0 refused=0
-export EXAM_ONCE_MODEL=$MODEL EXAM_ONCE_CASES=$LIBRARY/cases EXAM_ONCE_PROTOCOLS=$LIBRARY/protocols
+# An exam in two positions of the patient, so that it has two recordings.
+mkdir "$work/protocols"
+cat >"$work/protocols/two.yaml" <<'END'
+sonde_protocol: 1
+id: two
+title: Two
+text: Two.
+places:
+- {title: Groin, at: {station: common_femoral}}
+- {title: Knee, at: {station: popliteal}, position: prone_bent}
+END
+export EXAM_ONCE_MODEL=$MODEL EXAM_ONCE_CASES=$LIBRARY/cases EXAM_ONCE_PROTOCOLS=$work/protocols
 export EXAM_ONCE_SECONDS=0.4 EXAM_ONCE_ROOM_AFTER=0.1 EXAM_ONCE_DIR=$work/d DISK_FAULTS_UNDER=$work/d
 
 complain() {
@@ -35,14 +46,14 @@ member() { sed -n "s/^ *\"$1\": *\([0-9]*\),\{0,1\}\$/\1/p" "$work/json"; }
 # After the fault: everything that was told is there.
 check_exam() { # WHAT
   local what=$1 journals decided=0 file
-  "$SONDE" exam --recover "$work/d" --cases "$LIBRARY/cases" --protocols "$LIBRARY/protocols" --json \
+  "$SONDE" exam --recover "$work/d" --cases "$LIBRARY/cases" --protocols "$work/protocols" --json \
     >"$work/json" 2>"$work/err" || complain "$what: recovery failed"
   journals=$(find "$work/d" -name exam.rec | wc -l)
   if (($(said begun) > journals - $(member never_began) || $(member exams) != journals)); then
     complain "$what: $(said begun) begun, $journals journals, $(member exams) listed, $(member never_began) not begun"
     lost=$((lost + 1))
   fi
-  for file in "$work"/d/*/exam.rec; do
+  for file in "$work"/d/*/exam*.rec; do
     [[ -e $file ]] && decided=$((decided + $("$EXAM_ONCE" notes "$file" 2>/dev/null || echo 0)))
   done
   if (($(said decided) > decided)); then
@@ -56,7 +67,7 @@ check_exam() { # WHAT
   [[ -z $(find "$work/d" -mindepth 2 -name '*.part-*') ]] ||
     complain "$what: $(find "$work/d" -mindepth 2 -name '*.part-*') is left"
   # A second look finds nothing new: the log has them all.
-  "$SONDE" exam --recover "$work/d" --cases "$LIBRARY/cases" --protocols "$LIBRARY/protocols" --json \
+  "$SONDE" exam --recover "$work/d" --cases "$LIBRARY/cases" --protocols "$work/protocols" --json \
     >"$work/json" 2>"$work/err" || complain "$what: second recovery failed"
   (($(member added) + $(member derived) == 0)) || complain "$what: recovered twice"
 }

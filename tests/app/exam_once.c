@@ -46,9 +46,11 @@ static void ask(exam_app *app, const sonde_page_request *request) {
   pthread_mutex_unlock(&app->lock);
 }
 
-// Waits until the journal has so many notes on the disk, or the disk is in trouble.
-static bool wait_for_notes(exam_app *app, uint32_t count) {
+// Asks and waits until the journal has one more note on the disk, or the disk is in trouble.
+static bool ask_noted(exam_app *app, const sonde_page_request *request) {
   sonde_recording_state state = sonde_session_recording(app->session);
+  const uint32_t count = state.notes + 1;
+  ask(app, request);
   for (int i = 0; i < 1000 && state.notes < count && !state.in_trouble; ++i) {
     turn_for(app, 0);
     state = sonde_session_recording(app->session);
@@ -56,13 +58,11 @@ static bool wait_for_notes(exam_app *app, uint32_t count) {
   return state.notes >= count;
 }
 
-// The setup is the first note.
-static void decide(exam_app *app, const char *word, uint32_t notes) {
+static void decide(exam_app *app, const char *word) {
   sonde_page_request request = {.ask = SONDE_PAGE_DECIDE};
-  snprintf(request.id, sizeof request.id, "%s", app->exam->setup.map.segment[0].name);
+  snprintf(request.id, sizeof request.id, "%s", app->exam->setups.held[0].map.segment[0].name);
   snprintf(request.text, sizeof request.text, "%s", word);
-  ask(app, &request);
-  if (wait_for_notes(app, notes)) say("decided");
+  if (ask_noted(app, &request)) say("decided");
 }
 
 static bool is_kept(const exam_app *app) {
@@ -82,10 +82,11 @@ static int examine(exam_app *app) {
   }
   say("begun");
   turn_for(app, seconds / 2);
-  decide(app, "clot", 2);
-  ask(app, &(sonde_page_request){.ask = SONDE_PAGE_HINT});
+  decide(app, "clot");
+  ask_noted(app, &(sonde_page_request){.ask = SONDE_PAGE_HINT});
+  ask(app, &(sonde_page_request){.ask = SONDE_PAGE_POSITION, .id = "prone_bent"});
   turn_for(app, seconds / 2);
-  decide(app, "compressible", 4);
+  decide(app, "compressible");
   exam_finish(app, &error);
   if (is_kept(app)) say("kept");
   turn_for(app, is_kept(app) ? 0.05 : room_s);

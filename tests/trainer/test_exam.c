@@ -30,7 +30,8 @@ static sonde_score examine_at(const sonde_case *c, const sonde_case_setup *setup
   def.operator_name = name;
   sonde_score score;
   sonde_error error = {0};
-  if (sonde_exam_run(&def, setup, NULL, &score, &error)) fail_msg("%s", error.message);
+  sonde_exam_setups setups = {1, {*setup}};
+  if (sonde_exam_run(&def, &setups, NULL, &score, &error)) fail_msg("%s", error.message);
   return score;
 }
 
@@ -98,12 +99,13 @@ static void an_exam_can_be_cancelled(void **state) {
   sonde_case_setup setup;
   assert_int_equal(sonde_case_build(&healthy, NULL, NULL, &setup, NULL), SONDE_OK);
   sonde_plan plan = plan_of(&protocol, &setup.map);
+  sonde_exam_setups setups = {1, {setup}};
   def.plan = &plan;
   def.operator_name = "nobody";
-  assert_int_equal(sonde_exam_run(&def, &setup, NULL, &score, NULL), SONDE_NOT_FOUND);
+  assert_int_equal(sonde_exam_run(&def, &setups, NULL, &score, NULL), SONDE_NOT_FOUND);
   def.operator_name = "expert";
   def.limit_s = 0.5;
-  assert_int_equal(sonde_exam_run(&def, &setup, NULL, &score, NULL), SONDE_CONVERGENCE);
+  assert_int_equal(sonde_exam_run(&def, &setups, NULL, &score, NULL), SONDE_CONVERGENCE);
   sonde_case_setup_clear(&setup);
 }
 

@@ -61,7 +61,8 @@ static void what_is_shown_is_what_is_judged(void **state) {
       sonde_press_state now = sonde_judge_state(judge).state;
       if (now == SONDE_PRESS_STATE_NONE) continue;
       sonde_force_target shown = sonde_judge_guidance(judge).force;
-      double limit = plan.point[sonde_plan_nearest(&plan, vec3(0.07, 0, press.z_m))].target.limit_n;
+      double limit =
+          plan.point[sonde_plan_nearest(&plan, 0, vec3(0.07, 0, press.z_m))].target.limit_n;
       assert_true(shown.limit_n == limit);
       if (now == SONDE_PRESS_STATE_COMPLETE || now == SONDE_PRESS_STATE_OPEN)
         assert_true(s.force_normal_n <= shown.limit_n);

@@ -113,7 +113,7 @@ static void make_presses(uint32_t count) {
     for (uint32_t k = 0; k < made.plan.count && valid; ++k)
       if (fabs(made.plan.point[k].at.along_m - p->along_m) <= made.plan.criteria.reach_m)
         p->examined |= (uint64_t)1 << k;
-    p->place = sonde_plan_nearest(&made.plan, sonde_vein_at(&made.map, p->along_m).skin_m);
+    p->place = sonde_plan_nearest(&made.plan, 0, sonde_vein_at(&made.map, p->along_m).skin_m);
   }
   if (count > 5) made.presses[5].along_m = made.presses[5].vein_ratio = NAN;
   if (count > 5) made.presses[5].segment = SONDE_SEGMENTS;

@@ -38,6 +38,14 @@ export async function goTo(page) {
   }
 }
 
+/** Puts the patient in the position that the next place asks for, if it asks. */
+export async function turnPatient(page) {
+  const position = await page.evaluate(() => window.sonde.exam.step.position ?? "");
+  if (!position) return;
+  await page.locator("#position").selectOption(position);
+  await page.waitForFunction((p) => window.sonde.hello.limb?.position === p && window.sonde.exam.position === p && window.sonde.exam.step.target !== null, position);
+}
+
 /** Turns the probe by keys as the page asks, until it lies across the vein: once round at most. */
 export async function turnAcross(page) {
   const angle = () => page.evaluate(() => window.sonde.exam.step);

@@ -6,7 +6,7 @@ import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync } f
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, turnAcross } from "./drive.mjs";
+import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, turnAcross, turnPatient } from "./drive.mjs";
 import { startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -65,6 +65,7 @@ async function guidedExam(page) {
   check(first.segments.some((s) => s.needed), "the exam names segments");
   check((await page.evaluate(() => window.sonde.controls.case)) === "", "the case's pathology is not told");
   for (let i = 0; i < 8; ++i) {
+    await turnPatient(page);
     const { exam } = await state(page);
     if (exam.step.target === null) break;
     await goTo(page);

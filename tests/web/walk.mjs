@@ -4,7 +4,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, openBrowser, PATIENCE_MS, ready, turnAcross } from "./drive.mjs";
+import { addressOf, openBrowser, PATIENCE_MS, ready, turnAcross, turnPatient } from "./drive.mjs";
 import { startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2, 5).map((p) => resolve(p));
@@ -76,6 +76,7 @@ await page.waitForFunction(() => window.sonde.exam?.phase === "running" && windo
 await pause(1500);
 await shot("running");
 for (let i = 0; i < 6; ++i) {
+  await turnPatient(page);
   const s = await step();
   if (!s.target && !s.segment) break;
   if (s.target) {

@@ -90,6 +90,9 @@ export class Connection {
   hint(): void {
     this.send({ type: "hint" });
   }
+  position(position: string): void {
+    this.send({ type: "position", position });
+  }
   finishExam(): void {
     this.send({ type: "finish_exam" });
   }

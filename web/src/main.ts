@@ -10,6 +10,7 @@ import { ExamBar } from "./exam";
 import { ForceBar } from "./force_bar";
 import { HistoryDialog } from "./history";
 import { Input } from "./input";
+import { limbWords } from "./limb";
 import { fillHelp, Readouts, Sliders } from "./panel";
 import { ForcePlot } from "./plot";
 import { Hold, nearestSite } from "./pose";
@@ -26,6 +27,9 @@ import { Traces } from "./traces";
 import { letGo, ROLE_ACTIONS, roleWords } from "./words";
 
 const HOME_SITE = 27;
+/** Stations of a limb where an exam begins: the groin, or what a position is for, behind the knee and the calf. */
+const GROIN_SITE = 1;
+const START_SITE: Record<string, number> = { prone: 8, prone_bent: 8, sitting: 10 };
 const NEAR_MM = 20; // farther from a site its curve says nothing about this place
 const COMFORT = 0.5; // of the limit, when the program does not say what is comfortable
 const LIFTED_MM = -8;
@@ -186,6 +190,8 @@ class App {
     find("about").textContent =
       `Sonde ${hello.program}. Trains and simulates; not a medical device. Patients, images and forces are computed.`;
     this.patient.greet(hello);
+    this.scene.setLimb(hello.limb ?? null);
+    find("leg-name").textContent = hello.limb ? limbWords(hello.limb) : "";
     this.start.greet(hello);
     this.forceBar.limits(hello.force_limit_n, hello.comfort_n ?? COMFORT * hello.force_limit_n);
     find("start-button").hidden = find("exams-button").hidden = !hello.trainer;
@@ -233,7 +239,12 @@ class App {
     if (probe && probe !== controls.probe) this.connection.probe(probe);
     if (wantedCase && wantedCase !== controls.case) this.connection.pathology(wantedCase);
     const depth = Number.parseFloat(query.get("depth") ?? "");
-    this.setSite(Number.parseInt(query.get("site") ?? `${HOME_SITE}`, 10));
+    // Where the program has the probe over this leg; where it was over another says nothing.
+    this.snapshot = null;
+    this.route.forget();
+    const limb = this.phase === "practice" ? undefined : this.hello?.limb;
+    const home = limb ? (START_SITE[limb.position] ?? GROIN_SITE) : HOME_SITE;
+    this.setSite(Number.parseInt(query.get("site") ?? `${home}`, 10));
     this.setDepth(Number.isFinite(depth) ? depth : LIFTED_MM);
     for (const key of ["probe", "case", "depth", "site"]) query.delete(key); // once
   }
@@ -246,6 +257,7 @@ class App {
     if (exam.phase === "running" && before !== "running") this.begin(before);
     if (exam.phase === "practice" && exam.message && before !== "practice") this.say(exam.message, 8000);
     if (exam.phase === "running" || exam.phase === "done") this.examBar.show(exam, this.controls?.controls ?? false);
+    this.patient.turns(exam);
     if (exam.phase === "done") this.result.show(exam, this.controls?.controls ?? false, this.comments);
     else this.result.hide();
     if (exam.phase !== "replay") this.replayBar.leave();

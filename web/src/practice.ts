@@ -3,7 +3,7 @@
 import type { Connection, TissueKey } from "./connection";
 import { find, label, make, press, pressed, release } from "./dom";
 import { Chips } from "./panel";
-import type { Controls, Hello, Posture } from "./protocol";
+import type { Exam, Controls, Hello, Posture } from "./protocol";
 
 const POSTURES: Posture[] = ["supine", "sitting", "standing"];
 const SCALES: { key: TissueKey; name: string }[] = [
@@ -21,6 +21,7 @@ export class PatientTools {
   private controls: Controls | null = null;
   private readonly probes = find<HTMLSelectElement>("probes");
   private readonly posture = find<HTMLSelectElement>("posture");
+  private readonly position = find<HTMLSelectElement>("position");
   private readonly cases: Chips;
   private readonly scales = new Map<TissueKey, { input: HTMLInputElement; output: HTMLElement }>();
 
@@ -28,6 +29,7 @@ export class PatientTools {
     this.cases = new Chips(find("cases"), (name) => connection.pathology(name), shortCase);
     this.probes.onchange = () => (connection.probe(this.probes.value), release(this.probes));
     this.posture.onchange = () => (connection.posture(this.posture.value as Posture), release(this.posture));
+    this.position.onchange = () => (connection.position(this.position.value), release(this.position));
     press("valsalva", () => this.strain());
     press("gel-put", () => connection.gel("put"));
     press("gel-wipe", () => connection.gel("wipe"));
@@ -65,9 +67,28 @@ export class PatientTools {
     }
   }
 
+  /** The positions of an exam; the one that comes next is marked. */
+  turns(exam: Exam): void {
+    const all = exam.phase === "running" ? (exam.positions ?? []) : [];
+    find("position-box").hidden = all.length < 2;
+    find("position-box").classList.toggle("due", (exam.step.position ?? "") !== "");
+    const key = all.map((p) => p.id).join();
+    if (this.position.dataset.key !== key) {
+      this.position.dataset.key = key;
+      this.position.replaceChildren(...all.map((p) => Object.assign(make("option", "", p.title), { value: p.id })));
+    }
+    if (document.activeElement !== this.position) this.position.value = exam.position ?? "";
+    this.position.disabled = !this.controls?.controls;
+  }
+
   key(code: string, shift: boolean): boolean {
     const c = this.controls;
     if (!c?.controls) return false;
+    if (code === "KeyP" && !find("position-box").hidden) {
+      const all = [...this.position.options];
+      this.connection.position(all[(all.findIndex((o) => o.value === this.position.value) + 1) % all.length]!.value);
+      return true;
+    }
     if (code === "KeyP" && c.posture) this.connection.posture(POSTURES[(POSTURES.indexOf(c.posture) + 1) % 3]!);
     else if (code === "KeyV" && c.valsalva !== undefined) this.strain();
     else if (code === "KeyZ" && c.gel) this.connection.gel(shift ? "wipe" : "put");

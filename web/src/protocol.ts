@@ -43,6 +43,23 @@ export interface Hello {
   device?: string;
   /** above it a press is uncomfortable; half the limit when absent */
   comfort_n?: number;
+  /** of a whole limb */
+  limb?: LimbInfo;
+}
+
+export interface LimbInfo {
+  side: "left" | "right";
+  /** key of the position, and what the patient does in it */
+  position: string;
+  title: string;
+  /** away from the ground */
+  up: Vec3;
+  kneecap_mm: Vec3;
+  ankle_mm: Vec3;
+  ankle_radius_mm: number;
+  /** along the shin, and where the toes point */
+  down: Vec3;
+  forward: Vec3;
 }
 
 export interface CaseInfo {
@@ -112,6 +129,8 @@ export interface Step {
   offset_mm: number | null;
   angle_deg: number | null;
   angle_ok: boolean;
+  /** that the patient is to take first; empty: he lies right */
+  position?: string;
 }
 
 export interface Compression {
@@ -170,6 +189,9 @@ export interface Exam {
   history: string;
   protocol: string;
   guidance: Guidance;
+  /** how the patient lies, and the positions that the protocol asks for */
+  position?: string;
+  positions?: { id: string; title: string }[];
   elapsed_s: number;
   recording: boolean;
   step: Step;

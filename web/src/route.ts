@@ -58,6 +58,11 @@ export class Route {
     this.waypoints = far ? overSkin(skin, probe, goal).map((point) => above(skin, point)) : [];
   }
 
+  /** The probe is over another leg: it goes straight to its goal. */
+  forget(): void {
+    this.waypoints = [];
+  }
+
   /** True when the probe has reached a waypoint, so that the next pose is due. */
   passed(probe: Vec3): boolean {
     const next = this.waypoints[0];

@@ -8,10 +8,11 @@ import { find } from "./dom";
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
 import { FlatView, movedShare, type FlatVessel } from "./flat";
 import { Gel } from "./gel";
+import { Foot } from "./limb";
 import { Skin } from "./pose";
 import { Sides } from "./sides";
 import { TargetMark } from "./target";
-import { PART, type Frame, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
+import { PART, type Frame, type LimbInfo, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
 
 const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
 const FOV_DEG = 27;
@@ -98,6 +99,10 @@ export class LegScene {
   private readonly gel = new Gel();
   private readonly target = new TargetMark();
   private readonly sides = new Sides();
+  private readonly foot = new Foot();
+  private readonly lights = new THREE.Group();
+  private limb: LimbInfo | null = null;
+  private readonly centre = new THREE.Vector3(12, -8, 142); // that the camera looks at
   private probes: readonly ProbeInfo[] = [];
   private gelled = false;
   private dotInfo: SiteDot[] = [];
@@ -108,7 +113,7 @@ export class LegScene {
   private readonly vessels = new Map<number, FlatVessel>();
   private sites: readonly Site[] = [];
   private frame: Frame | null = null;
-  private middle_mm = 142;
+  private seen = ""; // side and position of the leg
   private faced = "";
   private away_mm = 560;
   /** whether the thigh is drawn without WebGL from now on */
@@ -132,7 +137,7 @@ export class LegScene {
     this.plane.renderOrder = 2.5; // after the skin, so that it shows through at full brightness
     this.plane.rotation.set(Math.PI / 2, 0, 0);
     this.probe.add(this.plane);
-    this.scene.add(this.inside, this.probe, this.ring, this.target.group, this.sides.group);
+    this.scene.add(this.inside, this.probe, this.ring, this.target.group, this.sides.group, this.foot.group, this.lights);
     this.addLights();
     this.camera.up.set(0, 1, 0);
     this.orbit = new OrbitControls(this.camera, canvas);
@@ -147,12 +152,12 @@ export class LegScene {
   }
 
   private addLights(): void {
-    this.scene.add(new THREE.HemisphereLight(0xdfe8f5, 0x3a3632, 1.7));
+    this.lights.add(new THREE.HemisphereLight(0xdfe8f5, 0x3a3632, 1.7));
     const key = new THREE.DirectionalLight(0xfff3e4, 2.4);
     key.position.set(260, 420, -160);
     const rim = new THREE.DirectionalLight(0x86a8d8, 0.9);
     rim.position.set(-300, 120, 300);
-    this.scene.add(key, rim);
+    this.lights.add(key, rim);
   }
 
   private configureOrbit(): void {
@@ -170,15 +175,37 @@ export class LegScene {
     let low = Infinity, high = -Infinity;
     for (let i = 2; i < mesh.points.length; i += 3) (low = Math.min(low, mesh.points[i]!)), (high = Math.max(high, mesh.points[i]!));
     const middle = low + MIDDLE_SHARE * (high - low), away = Math.min(FARTHEST_MM, AWAY_SHARE * (high - low));
-    const other = Math.abs(away - this.away_mm) > 0.3 * this.away_mm;
-    (this.middle_mm = middle), (this.away_mm = away);
+    const key = `${this.limb?.side} ${this.limb?.position}`;
+    const other = Math.abs(away - this.away_mm) > 0.3 * this.away_mm || key !== this.seen;
+    (this.seen = key), (this.away_mm = away);
+    this.centre.set(12, -8, middle);
+    // A bent leg is not about the model's axis.
+    if (this.limb) new THREE.Box3().setFromArray(mesh.points).getCenter(this.centre);
     if (other) this.home();
   }
 
-  /** Medial and anterior, the leg lying across the picture, the knee to the left. */
+  /** Side and position of a limb, before its skin comes: up is the patient's. */
+  setLimb(limb: LimbInfo | null): void {
+    this.limb = limb;
+    this.foot.place(limb);
+    this.sides.limb = limb;
+    const y = new THREE.Vector3(0, 1, 0), up = limb ? new THREE.Vector3(...limb.up) : y;
+    if (this.camera.up.distanceTo(up) < 1e-6) return;
+    this.camera.up.copy(up);
+    // The controls turn about the up of the camera that they were made with.
+    const inner = this.orbit as unknown as { _quat: THREE.Quaternion; _quatInverse: THREE.Quaternion };
+    inner._quat.setFromUnitVectors(up, y);
+    inner._quatInverse.copy(inner._quat).invert();
+    this.lights.quaternion.setFromUnitVectors(y, up);
+    this.home();
+  }
+
+  /** Medial and from above, the leg lying across the picture; a standing one seen from the front. */
   home(): void {
-    this.orbit.target.set(12, -8, this.middle_mm);
-    const away = new THREE.Vector3(0.74, 0.52, -0.43).normalize();
+    this.orbit.target.copy(this.centre);
+    const medial = this.limb?.side === "left" ? -1 : 1, up = this.camera.up;
+    const away = new THREE.Vector3(0.74 * medial, 0.52 * up.y, -0.43).normalize();
+    if (Math.abs(up.z) > 0.5) away.set(0.5 * medial, 0.8, -0.25).normalize();
     this.camera.position.copy(this.orbit.target).addScaledVector(away, this.away_mm);
     this.orbit.update();
     this.dirty = true;
@@ -211,6 +238,7 @@ export class LegScene {
     this.ends.material.depthWrite = !on;
     this.skinMaterial.needsUpdate = true;
     this.inside.visible = on;
+    this.foot.seeThrough(on);
     this.plane.visible = on && this.texture !== null;
     this.dirty = true;
   }

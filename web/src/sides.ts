@@ -1,6 +1,7 @@
 // Names of the leg's ends and sides, in the picture of the leg.
 
 import * as THREE from "three";
+import type { LimbInfo } from "./protocol";
 
 const HEIGHT_PX = 44; // of the drawn letters; shown at a third
 const SIZE = 0.032; // of the picture's height
@@ -43,6 +44,7 @@ function topNear(points: Float32Array, end_z: number): number {
 /** y points to the front, z from the groin down; x to the inner side of a right leg, the outer one of a left. */
 export class Sides {
   readonly group = new THREE.Group();
+  limb: LimbInfo | null = null; // whose side is known
   private middle_x = 0;
   private half_x = 0;
 
@@ -56,6 +58,11 @@ export class Sides {
       [INNER, 0, middle.y, middle.z, 1],
       [OUTER, 0, middle.y, middle.z, -1],
     ];
+    if (this.limb) {
+      const [cap, out, foot] = [this.limb.kneecap_mm, this.limb.forward, this.limb.ankle_mm];
+      at.push(["Kneecap", cap[0] + 2 * AWAY_MM * out[0], cap[1] + 2 * AWAY_MM * out[1], cap[2] + 2 * AWAY_MM * out[2], 0]);
+      at[1] = [`${this.limb.side === "left" ? "Left" : "Right"} foot`, foot[0], foot[1], foot[2] + 8 * AWAY_MM, 0];
+    }
     this.group.clear();
     for (const [text, x, y, z, side] of at) {
       const sprite = words(text);
@@ -70,7 +77,7 @@ export class Sides {
 
   /** The vein enters the leg on its inner side: its x there, mm. */
   veinAt(x: number): void {
-    const inner = x < this.middle_x ? -1 : 1;
+    const inner = this.limb ? (this.limb.side === "left" ? -1 : 1) : x < this.middle_x ? -1 : 1;
     for (const sprite of this.group.children) {
       const side = sprite.name === INNER ? inner : sprite.name === OUTER ? -inner : 0;
       sprite.userData.side = side;

@@ -147,6 +147,7 @@ static void read_request(reader *r, sonde_page_ask ask, sonde_page_request *q) {
     read_text(r, "segment", 1, 31, q->id, sizeof q->id);
     read_text(r, "decision", 0, 15, q->text, sizeof q->text);
     break;
+  case SONDE_PAGE_POSITION: read_text(r, "position", 1, 31, q->id, sizeof q->id); break;
   case SONDE_PAGE_OPEN_REPLAY: read_text(r, "exam", 1, 63, q->id, sizeof q->id); break;
   case SONDE_PAGE_SEEK: q->time_s = read_time(r); break;
   case SONDE_PAGE_PLAY:
@@ -164,9 +165,9 @@ static void read_request(reader *r, sonde_page_ask ask, sonde_page_request *q) {
 
 // Requests of the program after the page's own commands, in the order of sonde_page_ask.
 static const char *const TYPES[] = {
-    "goal",       "controls",   "stop",        "resume", "ack",  "ping",
-    "gel",        "role",       "start_exam",  "decide", "hint", "finish_exam",
-    "leave_exam", "list_exams", "open_replay", "seek",   "play", "comment"};
+    "goal",       "controls",    "stop",   "resume", "ack",      "ping",        "gel",
+    "role",       "start_exam",  "decide", "hint",   "position", "finish_exam", "leave_exam",
+    "list_exams", "open_replay", "seek",   "play",   "comment"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
 sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,

@@ -2,6 +2,7 @@
 #include "stream/page_message.h"
 
 #include "base/maths.h"
+#include "sonde/trainer.h"
 
 #include <string.h>
 
@@ -15,6 +16,37 @@ static void put_vector(sonde_json_out *out, const char *key, sonde_vec3 v, doubl
   put_real(out, NULL, v.x * scale);
   put_real(out, NULL, v.y * scale);
   put_real(out, NULL, v.z * scale);
+  sonde_json_end(out);
+}
+
+// Of a limb: side and position, and where knee cap and foot belong in a picture of it.
+static void put_limb(sonde_json_out *out, const sonde_model *model) {
+  const sonde_limb *limb = sonde_limb_of(model);
+  if (!limb) return;
+  const sonde_limb_pose *pose = sonde_limb_pose_of(model);
+  const sonde_limb_position position =
+      pose ? sonde_limb_pose_setting(pose).position : SONDE_LIMB_POSITIONS;
+  const double kneecap = 0.97, ankle = 2; // levels
+  sonde_pose shin = {{0, 0, 0}, quat_identity()};
+  if (pose) shin = sonde_limb_pose_bone(pose, SONDE_LIMB_TIBIA);
+  sonde_vec3 knee_m = sonde_limb_point(limb, kneecap, 0, 1);
+  if (pose) knee_m = sonde_limb_pose_point(pose, knee_m);
+  sonde_vec3 ankle_m = pose_apply(shin, sonde_limb_point(limb, ankle, 0, 0));
+  sonde_vec3 down = q_rotate(shin.rotation, vec3(0, 0, -1)),
+             forward = q_rotate(shin.rotation, vec3(0, 1, 0));
+  down.z = -down.z, forward.z = -forward.z; // the model's z runs the other way
+  sonde_json_begin_object(out, "limb");
+  sonde_json_put_text(out, "side",
+                      sonde_limb_body_of(limb)->side == SONDE_LIMB_LEFT ? "left" : "right");
+  sonde_json_put_text(out, "position", sonde_position_key(position));
+  sonde_json_put_text(out, "title", sonde_position_title(position));
+  const sonde_vec3 up = model->gravity.up;
+  put_vector(out, "up", v_norm2(up) > 0 ? up : vec3(0, 1, 0), 1);
+  put_vector(out, "kneecap_mm", sonde_limb_to_model(limb, knee_m), 1e3);
+  put_vector(out, "ankle_mm", sonde_limb_to_model(limb, ankle_m), 1e3);
+  put_vector(out, "down", down, 1);
+  put_vector(out, "forward", forward, 1);
+  put_real(out, "ankle_radius_mm", 1e3 * sonde_limb_girth(limb, ankle) / (2 * SONDE_PI));
   sonde_json_end(out);
 }
 
@@ -77,6 +109,7 @@ void page_write_hello(sonde_json_out *out, const page_hello *hello) {
     sonde_json_end(out);
   }
   sonde_json_end(out);
+  put_limb(out, model);
   if (hello->more && hello->more[0]) sonde_file_printf(out->file, ",%s", hello->more);
   sonde_json_end(out);
 }

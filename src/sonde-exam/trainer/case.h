@@ -10,6 +10,8 @@ extern const char *const sonde_case_lesions[];
 extern const char *const sonde_case_sexes[];
 extern const char *const sonde_case_sides[];
 extern const char *const sonde_case_positions[]; // of sonde_limb_position, then straight
+// All bits of sonde_case.positions.
+enum { CASE_ALL_POSITIONS = (1 << SONDE_LIMB_POSITIONS) - 1 };
 
 // Everything that needs no model; a sentence without place.
 sonde_status sonde_case_check(const sonde_case *of, sonde_error *error);

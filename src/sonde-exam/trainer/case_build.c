@@ -182,7 +182,8 @@ static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *
 sonde_status sonde_case_build(const sonde_case *from, const char *bundled, const char *directory,
                               sonde_case_setup *setup, sonde_error *error) {
   SONDE_ASSERT(from && setup);
-  *setup = (sonde_case_setup){.pathology = from->pathology, .circulation = from->circulation};
+  *setup = (sonde_case_setup){
+      .position = from->position, .pathology = from->pathology, .circulation = from->circulation};
   setup->findings.webs = from->webs;
   setup->findings.oedema = from->oedema;
   sonde_status status = sonde_case_check(from, error);

@@ -19,6 +19,29 @@ static const char *const DECISIONS[] = {"", "compressible", "clot", "not_seen"};
 
 static const double UNKNOWN = (double)NAN;
 
+static const char *const POSITION_TITLES[] = {
+    "on the back, the leg turned out", "prone, the knee bent",    "sitting, the calf hanging",
+    "on the back, the leg straight",   "prone, the leg straight", "standing",
+    "lying, the leg straight"};
+_Static_assert(SONDE_COUNT_OF(POSITION_TITLES) == SONDE_LIMB_POSITIONS + 1, "a title for each");
+
+const char *sonde_position_key(sonde_limb_position position) {
+  SONDE_ASSERT((unsigned)position <= SONDE_LIMB_POSITIONS);
+  return sonde_case_positions[position];
+}
+
+const char *sonde_position_title(sonde_limb_position position) {
+  SONDE_ASSERT((unsigned)position <= SONDE_LIMB_POSITIONS);
+  return POSITION_TITLES[position];
+}
+
+bool sonde_case_takes(const sonde_case *of, sonde_limb_position position) {
+  SONDE_ASSERT(of && (unsigned)position <= SONDE_LIMB_POSITIONS);
+  if (position == of->position) return true;
+  return of->thigh == SONDE_CASE_LEG && of->circulation.posture == SONDE_POSTURE_SUPINE &&
+         position < SONDE_LIMB_POSITIONS && (of->positions >> position & 1);
+}
+
 const char *sonde_case_level_name(sonde_case_level level) {
   SONDE_ASSERT(level <= SONDE_CASE_HARD);
   return sonde_case_levels[level];
@@ -42,6 +65,7 @@ sonde_case sonde_case_default(void) {
   sonde_case c = {.known = sonde_thigh_unknown(),
                   .leg = sonde_limb_unknown(),
                   .position = SONDE_LIMB_POSITIONS,
+                  .positions = CASE_ALL_POSITIONS,
                   .circulation = sonde_circulation_default(),
                   .extent.whole = true};
   sonde_status status = sonde_pathology_preset("healthy", &c.pathology, NULL);
@@ -52,15 +76,15 @@ sonde_case sonde_case_default(void) {
 // ---- the patient
 
 // What a map gives of a body that is drawn: its seed, its sex and parameters, in their units at the
-// boundary. `leg`: side and position are keys too.
+// boundary. `leg`: side and positions are keys too.
 static sonde_sex read_body(sonde_reader *reader, sonde_place at, const char *what, bool leg,
                            const sonde_parameter *parameter, uint32_t count, void *to,
                            uint64_t *seed) {
   enum { KEYS = 48 };
   const char *keys[KEYS] = {"seed", "sex"};
-  SONDE_ASSERT(count + 5 <= KEYS);
+  SONDE_ASSERT(count + 6 <= KEYS);
   for (uint32_t i = 0; i < count; ++i) keys[2 + i] = parameter[i].name;
-  if (leg) keys[2 + count] = "side", keys[3 + count] = "position";
+  if (leg) keys[2 + count] = "side", keys[3 + count] = "position", keys[4 + count] = "positions";
   sonde_read_keys(reader, at, what, keys);
   for (uint32_t i = 0; i < count; ++i) {
     const sonde_parameter *p = &parameter[i];
@@ -88,6 +112,21 @@ static void read_thigh(sonde_reader *reader, sonde_place root, sonde_case *c) {
     c->leg.side = (sonde_limb_side)sonde_read_choice(reader, leg, "side", sonde_case_sides, 0);
     c->position = (sonde_limb_position)sonde_read_choice(
         reader, leg, "position", sonde_case_positions, SONDE_LIMB_POSITIONS);
+    sonde_place others = sonde_read_find(reader, leg, "positions");
+    if (others) c->positions = 0;
+    for (uint32_t i = 0; others && i < sonde_read_count(reader, others); ++i) {
+      sonde_place item = sonde_read_item(reader, others, i);
+      const char *text = sonde_read_text_at(reader, item, "positions");
+      uint32_t k = 0;
+      while (k < SONDE_LIMB_POSITIONS && text && strcmp(text, sonde_case_positions[k]) != 0) ++k;
+      if (text && k < SONDE_LIMB_POSITIONS)
+        c->positions |= 1u << k;
+      else if (text)
+        sonde_reader_fail(reader, item, SONDE_FORMAT,
+                          "positions has '%s', expected supine_turned, prone_bent, sitting, "
+                          "supine, prone or standing",
+                          text);
+    }
   }
   if (!at || leg) return;
   if (sonde_read_is_text(reader, at)) {

@@ -81,6 +81,12 @@ static void put_case(sonde_file *file, const sonde_case *c) {
                       sonde_case_sides[known.side]);
     if (c->position < SONDE_LIMB_POSITIONS)
       sonde_file_printf(file, "  position: %s\n", sonde_case_positions[c->position]);
+    if (c->positions != CASE_ALL_POSITIONS) {
+      sonde_file_printf(file, "  positions: [");
+      for (uint32_t k = 0; k < SONDE_LIMB_POSITIONS; ++k)
+        if (c->positions >> k & 1) sonde_file_printf(file, "%s, ", sonde_case_positions[k]);
+      sonde_file_printf(file, "]\n");
+    }
     put_parameters(file, p, count, &known);
   }
 

@@ -63,12 +63,12 @@ sonde_status sonde_judge_create(const sonde_vein_map *map, const sonde_plan *pla
   SONDE_ASSERT(map && plan && out && plan->count <= SONDE_PLAN_POINTS);
   sonde_judge *judge = *out = SONDE_NEW(sonde_judge, 1);
   if (!judge) return sonde_fail_memory(error);
-  judge->map = *map;
+  judge->map = judge->first = *map;
   judge->plan = *plan;
   judge->hint_s = -INFINITY;
   judge->seen = SONDE_SEGMENTS;
   for (uint32_t i = 0; i < plan->count; ++i) {
-    double at_m = plan->point[i].at.along_m, reach_m = plan->criteria.reach_m;
+    double at_m = plan->point[i].course_m, reach_m = plan->criteria.reach_m;
     SONDE_ASSERT(plan->point[i].segment < map->segment_count);
     sonde_vein_mark(map, judge->wanted, at_m - reach_m, at_m + reach_m); // none without along_m
   }
@@ -91,10 +91,11 @@ sonde_force_target sonde_press_target(const sonde_judge *judge) {
 }
 
 // Distance of the press under way from a place, along the main vein or where another is cut; NaN:
-// its vein is not in view.
+// its vein is not in view, or the patient lies otherwise.
 static double distance_from(const sonde_judge *judge, const sonde_plan_point *place) {
   uint32_t slot = sonde_segment_slot(&judge->map, place->segment);
   sonde_vec3 start_m = judge->view[slot].start_m;
+  if (place->held != judge->held) return (double)NAN;
   if (slot != 0) return v_distance(start_m, place->at.vein_m);
   if (isnan(start_m.z)) return start_m.z;
   return fabs(sonde_vein_along(&judge->map, start_m.z) - place->at.along_m);
@@ -157,7 +158,8 @@ sonde_compression sonde_press_weigh(const sonde_judge *judge) {
     of_main |=
         (p.examined >> i & 1) && sonde_segment_slot(&judge->map, plan->point[i].segment) == 0;
   if (isfinite(main->start_m.z) && of_main) {
-    p.along_m = sonde_vein_along(&judge->map, main->start_m.z);
+    double along_m = sonde_vein_along(&judge->map, main->start_m.z);
+    p.along_m = sonde_vein_course(&judge->map, &judge->first, along_m);
     p.segment = sonde_vein_segment_at(&judge->map, main->start_m.z);
   }
   if (isfinite(p.z_m) && slot != 0) p.segment = slot;
@@ -205,7 +207,7 @@ static bool end_press(sonde_judge *judge) {
     }
     double cover_m = judge->plan.criteria.reach_m + COVER_EXTRA_M;
     if (isfinite(p->along_m))
-      sonde_vein_mark(&judge->map, judge->covered, p->along_m - cover_m, p->along_m + cover_m);
+      sonde_vein_mark(&judge->first, judge->covered, p->along_m - cover_m, p->along_m + cover_m);
     for (uint32_t k = 0; k < SONDE_SEGMENTS; ++k) {
       judge->open[k] += shown[k] == SONDE_PRESS_OPEN;
       judge->complete[k] += shown[k] == SONDE_PRESS_COMPLETE;
@@ -231,7 +233,8 @@ static bool end_press(sonde_judge *judge) {
 bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
   SONDE_ASSERT(judge && snapshot);
   const double none = (double)NAN;
-  const sonde_snapshot *s = snapshot;
+  sonde_snapshot now = *snapshot, *s = &now;
+  now.time_s += judge->before_s, now.restores += judge->restores_before;
   bool kept = true;
   if (!isfinite(s->time_s) || !isfinite(s->force_normal_n)) return true;
   if (judge->started && !(s->time_s > judge->last.time_s)) return true;
@@ -259,7 +262,7 @@ bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
           .start_s = s->time_s - judge->first_s,
           .segment = SONDE_SEGMENTS,
           .point = SONDE_PLAN_POINTS,
-          .place = sonde_plan_nearest(&judge->plan, s->world_from_probe.position),
+          .place = sonde_plan_nearest(&judge->plan, judge->held, s->world_from_probe.position),
           .z_m = none,
           .along_m = none,
           .vein_ratio = none,
@@ -303,6 +306,22 @@ bool sonde_judge_feed(sonde_judge *judge, const sonde_snapshot *snapshot) {
   return kept;
 }
 
+bool sonde_judge_hold(sonde_judge *judge, uint32_t held, const sonde_vein_map *map) {
+  SONDE_ASSERT(judge && map && map->segment_count == judge->first.segment_count);
+  bool kept = sonde_judge_finish(judge);
+  const double none = (double)NAN;
+  judge->map = *map;
+  judge->held = held;
+  // Time goes on; the way of the probe between the two is no path.
+  judge->before_s = judge->started ? judge->last.time_s : 0;
+  judge->restores_before = judge->restores;
+  judge->motion.started = false;
+  judge->last.force_normal_n = judge->trough_n = 0;
+  judge->last.artery_area_ratio = none;
+  for (uint32_t k = 0; k < SONDE_SEGMENTS; ++k) judge->view[k].now = none;
+  return kept;
+}
+
 bool sonde_judge_finish(sonde_judge *judge) { return judge->pressing ? end_press(judge) : true; }
 
 const sonde_compression *sonde_judge_compressions(const sonde_judge *judge, uint32_t *count) {
@@ -319,9 +338,9 @@ sonde_judge_now sonde_judge_state(const sonde_judge *judge) {
   if (!judge->started) return now;
   if (judge->pressing) now.state = OF[sonde_press_weigh(judge).result];
   // The vein of the place at the probe.
-  uint32_t place = judge->pressing
-                       ? judge->now.place
-                       : sonde_plan_nearest(&judge->plan, judge->last.world_from_probe.position);
+  uint32_t place = judge->now.place;
+  if (!judge->pressing)
+    place = sonde_plan_nearest(&judge->plan, judge->held, judge->last.world_from_probe.position);
   bool placed = place < judge->plan.count;
   uint32_t segment = placed ? judge->plan.point[place].segment : 0;
   now.vein_ratio = judge->view[sonde_segment_slot(&judge->map, segment)].now;

@@ -43,8 +43,11 @@ typedef struct sonde_vein_view {
 } sonde_vein_view;
 
 struct sonde_judge {
-  sonde_vein_map map;
+  sonde_vein_map map, first; // of the setup in whose position the patient is; of the first setup
   sonde_plan plan;
+  uint32_t held;   // the setup of the map
+  double before_s; // time of the positions before
+  uint32_t restores_before;
   sonde_decision decision[SONDE_SEGMENTS];
   uint32_t hints;
   double hint_s; // when the last one was asked for

@@ -100,9 +100,17 @@ sonde_guidance sonde_judge_guidance(const sonde_judge *judge) {
                       .undecided = SONDE_SEGMENTS};
   for (uint32_t i = judge->plan.count; i-- > 0;)
     if (!judge->done[i]) g.point = i;
-  if (g.point < judge->plan.count) g.force = judge->plan.point[g.point].target;
+  if (g.point < judge->plan.count) {
+    g.force = judge->plan.point[g.point].target;
+    g.turn = judge->plan.point[g.point].held != judge->held;
+  }
   if (judge->pressing) g.force = sonde_press_target(judge);
-  say_next(judge, &g);
+  if (g.turn)
+    snprintf(g.text, sizeof g.text, "%s the patient in another position: %s.",
+             judge->pressing ? "Let go and put" : "Put",
+             sonde_position_title(judge->plan.point[g.point].position));
+  else
+    say_next(judge, &g);
 
   // The finding is asked for before what comes next: first of the segment that was just seen, while
   // it is still in the learner's mind and in the picture.

@@ -7,7 +7,7 @@ sonde_metrics sonde_judge_metrics(const sonde_judge *judge) {
       .points = judge->plan.count, .hints = judge->hints, .restores = judge->restores};
 
   // Shares of the vein that good presses cover, and the longest stretch that none does.
-  uint32_t wanted = 0, both = 0, covered = 0, steps = sonde_vein_steps(&judge->map);
+  uint32_t wanted = 0, both = 0, covered = 0, steps = sonde_vein_steps(&judge->first);
   for (uint32_t i = 0; i < steps; ++i) {
     wanted += judge->wanted[i];
     covered += judge->covered[i];
@@ -25,7 +25,7 @@ sonde_metrics sonde_judge_metrics(const sonde_judge *judge) {
     if (!judge->done[i]) missed_m = stretch_m;
   }
   m.coverage = wanted ? (double)both / wanted : 0;
-  m.vein_coverage = fmin(1, covered / fmin(judge->map.length_m / JUDGE_BIN_M, JUDGE_BINS));
+  m.vein_coverage = fmin(1, covered / fmin(judge->first.length_m / JUDGE_BIN_M, JUDGE_BINS));
   m.gap_m = fmax(missed_m, (gap.to - gap.from) * JUDGE_BIN_M);
 
   // Places and presses.

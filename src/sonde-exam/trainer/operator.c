@@ -102,12 +102,13 @@ static const double ARCH_M = 0.03, ARCH_TURNED_M = 0.05; // out of a way through
 static const double STRAINS_PA = 5 * SONDE_PA_PER_MMHG;  // above the calm pressure: wide veins
 static const double FLIGHT = 2; // speed through the air over that along the skin
 
-typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, DONE } phase;
+typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, TURN, DONE } phase; // TURN: of the patient
 
 struct sonde_operator {
   habit habit;
   sonde_vein_map map;
   sonde_plan plan;
+  uint32_t held; // setup in whose position the patient is
   uint64_t seed, draws;
   sonde_device hand; // functions and self only; the session owns it
   bool visit[SONDE_PLAN_POINTS];
@@ -208,7 +209,8 @@ static sonde_pose pose_at(const sonde_operator *op) {
 static void begin_place(sonde_operator *op, uint32_t place) {
   while (place < op->plan.count && !op->visit[place]) ++place;
   const uint32_t before = op->place;
-  const bool any = op->started && before < op->plan.count && place < op->plan.count;
+  const bool turns = place < op->plan.count && op->plan.point[place].held != op->held;
+  const bool any = op->started && before < op->plan.count && place < op->plan.count && !turns;
   if (any && before != place) {
     const sonde_plan_point *old = &op->plan.point[before], *next = &op->plan.point[place];
     op->left = pose_at(op);
@@ -224,8 +226,26 @@ static void begin_place(sonde_operator *op, uint32_t place) {
   }
   op->place = place;
   op->attempt = op->opens = 0;
-  op->phase = place < op->plan.count ? TRAVEL : DONE;
+  op->phase = place >= op->plan.count ? DONE : turns ? TURN : TRAVEL;
   if (op->phase == TRAVEL) aim(op);
+}
+
+uint32_t sonde_operator_wants(const sonde_operator *op) {
+  return op->phase == TURN ? op->plan.point[op->place].held : op->held;
+}
+
+sonde_status sonde_operator_hold(sonde_operator *op, uint32_t held, const sonde_vein_map *map,
+                                 double dt_s, sonde_device *device, sonde_error *error) {
+  SONDE_ASSERT(op && op->phase == TURN && map && device && held == sonde_operator_wants(op));
+  op->map = *map, op->held = held;
+  op->last_s = op->along_m = op->across_m = op->twist_rad = 0;
+  op->depth_m = -LIFT_M;
+  op->flying = false;
+  op->phase = TRAVEL;
+  aim(op);
+  sonde_status status = sonde_device_page(pose_at(op), dt_s, device, error);
+  if (!status) op->hand = *device;
+  return status;
 }
 
 sonde_status sonde_operator_create(const char *name, uint64_t seed, const sonde_vein_map *map,
@@ -362,9 +382,10 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     op->depth_m = towards(op->depth_m, -LIFT_M, RELEASE_M_S * dt_s);
     if (op->depth_m <= -LIFT_M) weigh_press(op);
     break;
+  case TURN:
   case DONE: break;
   }
-  if (op->phase != DONE) sonde_device_page_goal(&op->hand, pose_at(op));
+  if (op->phase != DONE && op->phase != TURN) sonde_device_page_goal(&op->hand, pose_at(op));
 }
 
 bool sonde_operator_done(const sonde_operator *op) { return op->phase == DONE; }

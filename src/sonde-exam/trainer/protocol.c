@@ -1,5 +1,5 @@
 // Protocols: their files, and their places on one thigh.
-#include "trainer/trainer.h"
+#include "trainer/case.h"
 
 #include "base/bounds.h"
 
@@ -17,8 +17,8 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
   SONDE_ASSERT(text && name && out);
   static const char *const KEYS[] = {"sonde_protocol", "id",     "title", "text",
                                      "criteria",       "places", NULL};
-  static const char *const PLACE[] = {"title", "text", "needs",    "segment", "at",
-                                      "from",  "to",   "every_mm", NULL};
+  static const char *const PLACE[] = {"title", "text", "needs",    "segment",  "at",
+                                      "from",  "to",   "every_mm", "position", NULL};
   static const char *const CRITERIA[] = {"tilt_deg", "closed_ratio", "open_ratio", "reach_mm",
                                          NULL};
   sonde_reader *reader;
@@ -63,6 +63,8 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
     sonde_read_member(reader, at, "needs", false, stop->needs, sizeof stop->needs);
     sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
     sonde_read_member(reader, at, "segment", false, stop->segment, sizeof stop->segment);
+    stop->position = (sonde_limb_position)sonde_read_choice(
+        reader, at, "position", sonde_case_positions, SONDE_LIMB_POSITIONS);
     sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
     sonde_place to = sonde_read_find(reader, at, "to");
     bool stands = one && sonde_read_find(reader, one, "station");
@@ -126,16 +128,25 @@ sonde_status sonde_exam_protocol_list(const char *directory, sonde_exam_protocol
 
 // ---- on a thigh
 
+// The map in whose position a stop is, and that of the first setup.
+typedef struct stop_maps {
+  uint32_t held;
+  sonde_limb_position position;
+  const sonde_vein_map *map, *first;
+} stop_maps;
+
 // A place at a station of the limb, or on the main vein at along_m when `station` is NULL.
-static sonde_status add_point(const sonde_exam_stop *stop, const sonde_vein_map *map,
+static sonde_status add_point(const sonde_exam_stop *stop, const stop_maps *maps,
                               const sonde_map_station *station, double along_m, sonde_plan *plan,
                               sonde_error *error) {
+  const sonde_vein_map *map = maps->map;
   const double none = (double)NAN;
   if (plan->count == SONDE_PLAN_POINTS)
     return sonde_fail(error, SONDE_ARGUMENT, "more than %d places, expected fewer",
                       SONDE_PLAN_POINTS);
   sonde_plan_point *point = &plan->point[plan->count];
-  *point = (sonde_plan_point){.station = station != NULL};
+  *point = (sonde_plan_point){
+      .held = maps->held, .position = maps->position, .station = station != NULL};
   if (station) {
     // The probe as it stands there, over the first vein of the segment.
     point->segment = stop->segment[0] ? sonde_vein_segment(map, stop->segment) : station->segment;
@@ -171,44 +182,93 @@ static sonde_status add_point(const sonde_exam_stop *stop, const sonde_vein_map 
   bool own = stop->text[0] || !station || !station->text;
   snprintf(point->text, sizeof point->text, "%s", own ? stop->text : station->text);
   point->target = (sonde_force_target){none, none, none};
+  point->course_m = sonde_vein_course(map, maps->first, point->at.along_m);
   plan->count++;
   return SONDE_OK;
+}
+
+// The places of one stop of the protocol.
+static sonde_status add_stop(const sonde_exam_stop *stop, const stop_maps *maps, sonde_plan *plan,
+                             sonde_error *error) {
+  const sonde_vein_map *map = maps->map;
+  if (stop->needs[0] && !sonde_vein_has_branch(map, stop->needs)) return SONDE_OK;
+  double from_m, to_m;
+  for (uint32_t k = 0; k < map->station_count && !(stop->every_m > 0); ++k)
+    if (strcmp(map->station[k].name, stop->from.station) == 0)
+      return add_point(stop, maps, &map->station[k], 0, plan, error);
+  sonde_status status = sonde_station_find(&stop->from, map, &from_m, error);
+  if (!status && stop->segment[0])
+    status = sonde_fail(error, SONDE_NOT_FOUND, "'%s': a thigh has no station for %s", stop->title,
+                        stop->segment);
+  if (!status && !(stop->every_m > 0)) return add_point(stop, maps, NULL, from_m, plan, error);
+  // Equal steps of at most every_m from the first place to the last.
+  if (!status) status = sonde_station_find(&stop->to, map, &to_m, error);
+  if (status) return status;
+  double steps = fmax(1, ceil((fabs(to_m - from_m) - SAME_M) / stop->every_m));
+  for (double k = 0; k <= steps && !status; ++k)
+    status = add_point(stop, maps, NULL, from_m + (to_m - from_m) * k / steps, plan, error);
+  return status;
+}
+
+static sonde_status end_plan(const sonde_exam_protocol *protocol, const sonde_plan *plan,
+                             sonde_error *error) {
+  SONDE_ASSERT(plan->count <= SONDE_PLAN_POINTS);
+  if (plan->count > 0) return SONDE_OK;
+  return sonde_fail(error, SONDE_ARGUMENT, "the thigh has no place of the protocol '%s'",
+                    protocol->id);
 }
 
 sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_vein_map *map,
                              sonde_plan *plan, sonde_error *error) {
   SONDE_ASSERT(protocol && map && plan);
   *plan = (sonde_plan){.criteria = protocol->criteria};
+  const stop_maps maps = {0, SONDE_LIMB_POSITIONS, map, map};
+  sonde_status status = SONDE_OK;
+  for (uint32_t i = 0; i < protocol->stop_count && !status; ++i)
+    status = add_stop(&protocol->stop[i], &maps, plan, error);
+  return status ? status : end_plan(protocol, plan, error);
+}
+
+// ---- in the positions that it asks for
+
+sonde_status sonde_exam_prepare(const sonde_case *from, const sonde_exam_protocol *protocol,
+                                const char *bundled, const char *directory,
+                                const sonde_progress *progress, sonde_exam_setups *setups,
+                                sonde_plan *plan, sonde_error *error) {
+  SONDE_ASSERT(from && protocol && setups && plan);
+  setups->count = 0;
+  *plan = (sonde_plan){.criteria = protocol->criteria};
   sonde_status status = SONDE_OK;
   for (uint32_t i = 0; i < protocol->stop_count && !status; ++i) {
+    // The setup of the stop's position, built when there is none yet.
     const sonde_exam_stop *stop = &protocol->stop[i];
-    if (stop->needs[0] && !sonde_vein_has_branch(map, stop->needs)) continue;
-    double from_m, to_m;
-    const sonde_map_station *station = NULL;
-    for (uint32_t k = 0; k < map->station_count && !(stop->every_m > 0); ++k)
-      if (strcmp(map->station[k].name, stop->from.station) == 0) station = &map->station[k];
-    if (station) {
-      status = add_point(stop, map, station, 0, plan, error);
-      continue;
+    sonde_case turned = *from;
+    if (stop->position < SONDE_LIMB_POSITIONS && sonde_case_takes(from, stop->position))
+      turned.position = stop->position;
+    uint32_t held = 0;
+    while (held < setups->count && setups->held[held].position != turned.position) ++held;
+    if (held == SONDE_EXAM_SETUPS)
+      status = sonde_fail(error, SONDE_ARGUMENT, "the protocol asks for more than %d positions",
+                          SONDE_EXAM_SETUPS);
+    sonde_case_setup *setup = &setups->held[held], *first = &setups->held[0];
+    if (!status && held == setups->count) {
+      status = sonde_case_build(&turned, bundled, directory, setup, error);
+      setups->count += !status;
     }
-    status = sonde_station_find(&stop->from, map, &from_m, error);
-    if (!status && stop->segment[0])
-      status = sonde_fail(error, SONDE_NOT_FOUND, "'%s': a thigh has no station for %s",
-                          stop->title, stop->segment);
-    if (!status && !(stop->every_m > 0)) {
-      status = add_point(stop, map, NULL, from_m, plan, error);
-      continue;
-    }
-    // Equal steps of at most every_m from the first place to the last.
-    if (!status) status = sonde_station_find(&stop->to, map, &to_m, error);
-    if (status) return status;
-    double steps = fmax(1, ceil((fabs(to_m - from_m) - SAME_M) / stop->every_m));
-    for (double k = 0; k <= steps && !status; ++k)
-      status = add_point(stop, map, NULL, from_m + (to_m - from_m) * k / steps, plan, error);
+    if (status) break;
+    // The same leg has the same segments in every position.
+    SONDE_ASSERT(setup->map.segment_count == first->map.segment_count);
+    const stop_maps maps = {held, turned.position, &setup->map, &first->map};
+    status = add_stop(stop, &maps, plan, error);
   }
-  SONDE_ASSERT(plan->count <= SONDE_PLAN_POINTS);
-  if (!status && plan->count == 0)
-    status = sonde_fail(error, SONDE_ARGUMENT, "the thigh has no place of the protocol '%s'",
-                        protocol->id);
+  if (!status) status = end_plan(protocol, plan, error);
+  if (!status) status = sonde_plan_find_targets(plan, setups->held, progress, error);
+  if (status) sonde_exam_setups_clear(setups);
   return status;
+}
+
+void sonde_exam_setups_clear(sonde_exam_setups *setups) {
+  if (!setups) return;
+  for (uint32_t k = 0; k < setups->count; ++k) sonde_case_setup_clear(&setups->held[k]);
+  setups->count = 0;
 }

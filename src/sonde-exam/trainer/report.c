@@ -50,7 +50,7 @@ static void put_vein(sonde_json_out *out, const sonde_exam_report *exam) {
 
   // Planned and examined stretches, in the steps that the judge counts.
   for (uint32_t i = 0; i < exam->plan->count; ++i) {
-    double at_m = exam->plan->point[i].at.along_m;
+    double at_m = exam->plan->point[i].course_m;
     sonde_vein_mark(map, planned, at_m - reach_m, at_m + reach_m);
   }
   for (uint32_t i = 0; i < exam->press_count; ++i) {

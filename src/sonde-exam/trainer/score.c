@@ -30,11 +30,11 @@ void sonde_judge_score(const sonde_judge *judge, const sonde_case *truth, sonde_
   const sonde_metrics *m = &score->metrics;
 
   // Right and supported decisions, segment by segment.
-  score->segment_count = judge->map.segment_count;
+  score->segment_count = judge->first.segment_count;
   for (uint32_t i = 0; i < score->segment_count; ++i) {
     sonde_segment_status status = sonde_judge_segment(judge, i);
     sonde_segment_verdict *v = &score->segment[i];
-    const sonde_exam_segment *segment = &judge->map.segment[i];
+    const sonde_exam_segment *segment = &judge->first.segment[i];
     *v = (sonde_segment_verdict){.needed = status.needed,
                                  .decision = status.decision,
                                  .truth = sonde_case_truth(truth, segment->name),

@@ -108,13 +108,14 @@ void sonde_put_result(sonde_json_out *out, const sonde_exam_report *exam) {
   sonde_json_begin_list(out, "places");
   for (uint32_t i = 0; i < exam->plan->count; ++i) {
     const sonde_plan_point *p = &exam->plan->point[i];
-    const sonde_named figures[] = {{"along_mm", 1e3 * p->at.along_m},
+    const sonde_named figures[] = {{"along_mm", 1e3 * p->course_m},
                                    {"vein_depth_mm", 1e3 * p->at.depth_m},
                                    {"closes_n", p->target.closes_n},
                                    {"firm_n", p->target.firm_n},
                                    {"limit_n", p->target.limit_n}};
     sonde_json_begin_object(out, NULL);
     sonde_json_put_text(out, "title", p->title);
+    sonde_json_put_text(out, "position", sonde_position_key(p->position));
     sonde_put_named(out, figures, SONDE_COUNT_OF(figures));
     sonde_json_put_bool(out, "done",
                         sonde_place_is_done(exam->plan, i, exam->presses, exam->press_count));
@@ -154,7 +155,7 @@ sonde_status sonde_score_save(const sonde_judge *judge, const sonde_case *truth,
   if (json_path) {
     sonde_json_out out = {.layout = SONDE_JSON_LINES};
     sonde_exam_report exam = {.patient = truth,
-                              .map = &judge->map,
+                              .map = &judge->first,
                               .plan = &judge->plan,
                               .score = score,
                               .note = *note,
@@ -181,7 +182,7 @@ sonde_status sonde_score_save(const sonde_judge *judge, const sonde_case *truth,
                             1e3 * p->z_m,    p->force_peak_n, p->vein_ratio,
                             p->artery_ratio, p->artery_least, DEGREES * p->tilt_rad};
     sonde_file_printf(file, "%u,%s,%s", i + 1, sonde_press_result_name(p->result),
-                      segment_of(&judge->map, p));
+                      segment_of(&judge->first, p));
     for (size_t k = 0; k < SONDE_COUNT_OF(value); ++k)
       sonde_file_printf(file, isfinite(value[k]) ? ",%.9g" : ",", value[k]);
     sonde_file_printf(file, "\n");

@@ -12,13 +12,13 @@ sonde_force_target sonde_force_target_make(double closes_n) {
       .closes_n = closes_n, .firm_n = ceil(closes_n), .limit_n = ceil(ROOM * closes_n + ROOM_N)};
 }
 
-uint32_t sonde_plan_nearest(const sonde_plan *plan, sonde_vec3 face_m) {
+uint32_t sonde_plan_nearest(const sonde_plan *plan, uint32_t held, sonde_vec3 face_m) {
   SONDE_ASSERT(plan && plan->count <= SONDE_PLAN_POINTS);
   uint32_t nearest = SONDE_PLAN_POINTS;
   double least = INFINITY;
   for (uint32_t i = 0; i < plan->count; ++i) {
     double distance = v_distance(plan->point[i].at.skin_m, face_m);
-    if (distance < least) least = distance, nearest = i;
+    if (plan->point[i].held == held && distance < least) least = distance, nearest = i;
   }
   return nearest;
 }
@@ -57,13 +57,15 @@ static double find_closing_force(sonde_bench *bench, const sonde_plan *plan,
 sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *setup,
                                      const sonde_progress *progress, sonde_error *error) {
   SONDE_ASSERT(plan && setup && setup->model);
-  sonde_case_setup healthy = *setup;
-  healthy.circulation.breath_pa = 0;
-  healthy.circulation.valsalva_from_s = healthy.circulation.valsalva_to_s = 0;
-  sonde_status status = sonde_pathology_preset("healthy", &healthy.pathology, error);
+  sonde_status status = SONDE_OK;
   sonde_findings findings = {.oedema = setup->findings.oedema};
   for (uint32_t i = 0; i < plan->count && !status; ++i) {
     sonde_plan_point *point = &plan->point[i];
+    sonde_case_setup healthy = setup[point->held];
+    healthy.circulation.breath_pa = 0;
+    healthy.circulation.valsalva_from_s = healthy.circulation.valsalva_to_s = 0;
+    status = sonde_pathology_preset("healthy", &healthy.pathology, error);
+    if (status) return status;
     if (!sonde_progress_report(progress, (double)i / plan->count, point->title))
       return sonde_fail(error, SONDE_CANCELLED, "cancelled");
     uint32_t known = 0;
@@ -72,7 +74,7 @@ sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *s
     if (known < i) continue;
     sonde_bench bench;
     status = sonde_bench_open(&bench, &healthy, &findings, true, error);
-    double closes_n = status ? 0 : find_closing_force(&bench, plan, &setup->map, i);
+    double closes_n = status ? 0 : find_closing_force(&bench, plan, &healthy.map, i);
     sonde_bench_close(&bench);
     if (status) return status;
     if (!isfinite(closes_n))

@@ -28,6 +28,10 @@ typedef sonde_status (*sonde_item_load)(const char *path, void *item, sonde_erro
 sonde_status sonde_load_directory(const char *directory, size_t item_bytes, sonde_item_load load,
                                   void **items, uint32_t *count, sonde_error *error);
 
+// A distance along the main vein of one map where another map of the same leg has that place: by
+// shares of the segments. NaN stays.
+double sonde_vein_course(const sonde_vein_map *from, const sonde_vein_map *to, double along_m);
+
 // A double vein is as open as the one of the two that is; NaN when the first is not in view.
 static inline double sonde_vein_ratio(const sonde_snapshot *s) {
   double first = s->vein_area_ratio;
@@ -36,7 +40,8 @@ static inline double sonde_vein_ratio(const sonde_snapshot *s) {
 
 // Places of one station: one press is at both.
 static inline bool sonde_same_stand(const sonde_plan_point *a, const sonde_plan_point *b) {
-  return a->station && b->station && v_distance(a->at.skin_m, b->at.skin_m) < 1e-9;
+  return a->station && b->station && a->held == b->held &&
+         v_distance(a->at.skin_m, b->at.skin_m) < 1e-9;
 }
 
 #endif

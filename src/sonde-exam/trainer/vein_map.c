@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DIRECTIONS = 120, SMOOTH = 4 };
+enum { DIRECTIONS = 120, SMOOTH = 4, COURSE = 10 }; // the last two: points to either side
 static const double REACH_M = 0.2;
 static const double FACE_HALF_M = 0.025; // half of the picture's width: veins farther aside are not
                                          // in it
@@ -74,20 +74,30 @@ const char *sonde_segment_of_branch(const char *branch) {
   return NULL;
 }
 
-// The skin above every point, and the direction across the vein. The leg runs along z, and the ends
-// of the model are not skin, so the nearest skin is looked for across the leg; directions are
-// averaged along the vein.
+// The skin above every point, and the direction across the vein. The ends of the model are not
+// skin, so the nearest skin is looked for across the leg, which runs along z when it is straight
+// and with the vein, smoothed, when it is held in a position; directions are averaged along the
+// vein.
 static sonde_status find_skin(const sonde_model *model, sonde_vein_map *map, sonde_error *error) {
   sonde_surface_index *skin;
   sonde_status status = sonde_surface_index_create(&model->surface, &skin, error);
   if (status) return status;
+  const bool held = v_norm2(model->gravity.up) > 0;
   sonde_vec3 out[SONDE_VESSEL_POINTS];
   sonde_surface_point hit;
   for (uint32_t k = 0; k < map->point_count && !status; ++k) {
     double least_m = REACH_M;
+    sonde_vec3 u = vec3(1, 0, 0), v = vec3(0, 1, 0);
+    if (held) {
+      uint32_t from = k > COURSE ? k - COURSE : 0;
+      uint32_t to = k + COURSE < map->point_count ? k + COURSE : map->point_count - 1;
+      sonde_vec3 along = v_sub(map->point[to].vein_m, map->point[from].vein_m);
+      v = v_unit(v_cross(along, u), v);
+      u = v_unit(v_cross(v, along), u);
+    }
     for (int i = 0; i < DIRECTIONS; ++i) {
       double angle = 2 * SONDE_PI * i / DIRECTIONS;
-      sonde_vec3 direction = vec3(cos(angle), sin(angle), 0);
+      sonde_vec3 direction = v_add(v_scale(u, cos(angle)), v_scale(v, sin(angle)));
       if (!sonde_surface_raycast(skin, map->point[k].vein_m, direction, least_m, &hit)) continue;
       double distance_m = v_distance(hit.point_m, map->point[k].vein_m);
       if (distance_m < least_m) least_m = distance_m, out[k] = direction;
@@ -380,6 +390,23 @@ void sonde_vein_segment_ends(const sonde_vein_map *map, uint32_t segment, double
   double b = sonde_vein_along(map, map->segment[segment].to_m);
   *from_m = fmin(a, b);
   *to_m = fmax(a, b);
+}
+
+double sonde_vein_course(const sonde_vein_map *from, const sonde_vein_map *to, double along_m) {
+  SONDE_ASSERT(from && to && from->segment_count == to->segment_count);
+  if (from == to || isnan(along_m)) return along_m;
+  // Knots of both: the start of the first segment, then the end of each.
+  double a[2] = {0, 0}, b[2] = {0, 0};
+  for (uint32_t k = 0; k <= from->segment_count && a[1] < along_m; ++k) {
+    const uint32_t i = k > 0 ? k - 1 : 0;
+    double one[2], other[2];
+    if (from->segment[i].vein_count > 0) break;
+    sonde_vein_segment_ends(from, i, &one[0], &one[1]);
+    sonde_vein_segment_ends(to, i, &other[0], &other[1]);
+    a[0] = a[1], a[1] = one[k > 0];
+    b[0] = b[1], b[1] = other[k > 0];
+  }
+  return a[1] > a[0] ? b[0] + (along_m - a[0]) / (a[1] - a[0]) * (b[1] - b[0]) : along_m;
 }
 
 sonde_status sonde_station_find(const sonde_station *station, const sonde_vein_map *map,
