@@ -11,6 +11,7 @@
 #include <string.h>
 
 static const double DEEPEST_M = 0.06; // how far a press to a force goes
+static const double RESIDUAL = 1e-6;  // of the force, unbalanced at the end
 
 sonde_status settled_open(settled *s, const char *model, const char *probe,
                           const sonde_preset *preset, bool needs_interior, sonde_error *error) {
@@ -114,7 +115,7 @@ sonde_status settled_press(settled *s, sonde_pose start, double depth_m, double 
   assert(s->state && depth_m >= -0.01);
   sonde_progress progress = app_progress();
   sonde_path_def def = sonde_path_def_default();
-  def.force_n = force_n;
+  def.force_n = force_n, def.relative_residual = RESIDUAL;
   sonde_status status =
       sonde_settle_path(s->state, &s->probe, start, pose_shift(start, depth_m, pose_axis(start, 2)),
                         &def, &progress, &s->path, error);

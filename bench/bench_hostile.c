@@ -1,5 +1,6 @@
 // bench_hostile CASES [PICTURES [SEED [OUT.csv [LEG]]]]: random presses of all cases of a
-// directory, each on the legs of ten seeds, or of one; looks in every picture for tissue that is
+// directory, each on the legs of ten seeds, or of one, whole limbs where the case has one and
+// thighs elsewhere; looks in every picture for tissue that is
 // folded, that is where the map from rest to the picture does not keep orientation. PICTURES per
 // leg and case (default 3) differ in site, way off it, tilt (to 20 degrees), turn, probe, speed and
 // force (0 to 40 N). Half of them are taken while the probe moves, half at equilibrium of the
@@ -19,7 +20,7 @@
 static const double STEP_M = 0.3e-3, PROBING_M = 5e-6, AROUND_M = 6e-3, ABOVE_M = 40e-3;
 static const double DEPTH_M = 50e-3, SLAB_M = 0.3e-3;
 static const double MOST_N = 40, DEEPEST_M = 45e-3, TILT_RAD = 0.349, DT_S = 1e-3;
-static const double CLOSE_M = 0.2e-6;
+static const double CLOSE_M = 0.2e-6, LEAN_BMI = 19, LEAN_M = 5e-3;
 static const sonde_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 static const uint32_t FRAME_TICKS = 16, LEGS = 10;
 static const char *const PROBES[] = {"linear", "square", "point"};
@@ -222,13 +223,17 @@ static sonde_status take(scene *s, const char *id, uint64_t leg, uint64_t seed, 
   return SONDE_OK;
 }
 
-// A case on the thigh of a seed, with little fat in front, so that the vein is pressed hard.
+// A case on the limb or the thigh of a seed, a lean one, so that the veins are pressed hard.
 static sonde_status play(const sonde_case *from, uint64_t leg, long pictures, uint64_t seed,
                          totals *t, FILE *csv, sonde_error *error) {
   const sonde_world_def def = sonde_world_def_default();
   scene s = {0};
   sonde_case c = *from;
-  c.thigh = SONDE_CASE_GENERATED, c.seed = leg, c.known.fat_front_m = 0.005;
+  c.seed = leg;
+  if (c.thigh == SONDE_CASE_LEG)
+    c.leg.bmi = LEAN_BMI;
+  else
+    c.thigh = SONDE_CASE_GENERATED, c.known.fat_front_m = LEAN_M;
   sonde_status status = sonde_case_build(&c, NULL, NULL, &s.setup, error);
   if (!status) status = sonde_state_create(s.setup.model, &def, &s.state, error);
   if (!status) status = sonde_interior_create(s.setup.model, &s.interior, error);

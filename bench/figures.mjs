@@ -40,6 +40,15 @@ const spread = (runs, of) => {
   return { least: all[0], median: all[all.length >> 1], most: all[all.length - 1] }
 }
 
+// Rows by the names of the columns of the table that a program writes.
+const table_of = (bin, program) => {
+  const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-')), path = join(folder, 'table.csv')
+  run(bin, program, path)
+  const [head, ...rows] = readFileSync(path, 'utf8').trim().split('\n').map(line => line.split(','))
+  rmSync(folder, { recursive: true })
+  return rows.map(row => Object.fromEntries(head.map((name, k) => [name, row[k]])))
+}
+
 // A script under the system's interpreter with the package of the build.
 const python = (bin, ...options) =>
   JSON.parse(execFileSync('/usr/bin/python3', options, { encoding: 'utf8', cwd: HOME, maxBuffer: 1 << 26,
@@ -233,6 +242,25 @@ const GROUPS = {
       return values
     },
   },
+  // Forces and cuffs that close the veins of eight limbs at the stations, and what clots leave of them.
+  closing: {
+    sources: ['src/sonde-limb', 'src/sonde/interior', ...engine, 'bench/bench_closing.c'],
+    measure(bin) {
+      const rows = table_of(bin, 'bench_closing'), number = text => text === '' ? null : Number(text)
+      const veins = rows.map(r => ({ ...Object.fromEntries(Object.entries(r).map(([key, text]) => [key, ['sex', 'station', 'vein'].includes(key) ? text : number(text)])) }))
+      const closed = veins.filter(v => v.closed), early = closed.filter(v => v.force_n < v.least_n), late = closed.filter(v => v.force_n > v.most_n)
+      return { veins, count: veins.length, within: closed.length - early.length - late.length, early: early.length, late: late.length, open: veins.length - closed.length,
+        most_late_percent: Math.max(0, ...late.map(v => 100 * (v.force_n / v.most_n - 1))) }
+    },
+  },
+  // What ten whole legs cost.
+  legs: {
+    sources: ['src/sonde-limb', 'src/sonde/interior', 'src/sonde/echo', ...engine, 'bench/bench_legs.c'],
+    measure(bin) {
+      const rows = table_of(bin, 'bench_legs')
+      return Object.fromEntries(Object.keys(rows[0]).filter(key => key !== 'seed').map(key => [key, spread(rows, r => Number(r[key]))]))
+    },
+  },
   hostile: {
     sources: ['src/sonde/interior', 'src/sonde/world'],
     measure(bin) {
@@ -320,6 +348,43 @@ const BLOCKS = {
       ['deep vessels 0.3 mm or more under the deep fascia', limb.fascia], ['saphenous veins between both fasciae', limb.eye]]),
   limb_views: ({ limb }) => table(['view', 'true, % of limbs', `depth in its band, % of the ${limb.banded} of BMI 20 to 35`, 'at most 5 mm beyond it'],
     Array.from({ length: 11 }, (_, k) => [`V${k + 1}`, ...['true_percent', 'in_band_percent', 'near_band_percent'].map(key => fixed(limb[`v${k + 1}`][key], 1))])),
+  // Force (band), in bold outside of it, for each vein of each station.
+  closing_forces({ closing }) {
+    const bodies = [...new Set(closing.veins.map(v => `${v.bmi} ${v.sex}`))], names = [...new Set(closing.veins.map(v => `${v.station}: ${v.vein}`))]
+    const cell = v => {
+      if (!v) return ''
+      const band = `(${fixed(v.least_n, 1)} - ${fixed(v.most_n, 1)})`
+      if (!v.closed) return `**${fixed(v.area, 2)} open** ${band}`
+      return v.force_n < v.least_n || v.force_n > v.most_n ? `**${fixed(v.force_n, 1)}** ${band}` : `${fixed(v.force_n, 1)} ${band}`
+    }
+    return table(['station: vein', ...bodies.map(b => `BMI ${b.replace('female', 'woman').replace('male', 'man')}`)],
+      names.map(name => [name, ...bodies.map(body => cell(closing.veins.find(v => `${v.station}: ${v.vein}` === name && `${v.bmi} ${v.sex}` === body)))]))
+  },
+  closing_clots({ closing }) {
+    const stations = [...new Set(closing.veins.map(v => v.station))]
+    const range = (of, key) => {
+      const all = of.map(v => v[key]).filter(a => a !== null)
+      return all.length ? `${fixed(Math.min(...all), 2)} - ${fixed(Math.max(...all), 2)}` : ''
+    }
+    return table(['station', 'artery', 'fresh occlusive clot', 'a few weeks old', 'old', 'mural, 45 %'],
+      stations.map(s => [s, ...['artery', 'acute_occlusive', 'subacute_occlusive', 'chronic_occlusive', 'partial_mural'].map(key => range(closing.veins.filter(v => v.station === s && v.closed), key))]))
+  },
+  closing_cuffs({ closing }) {
+    const range = key => {
+      const all = closing.veins.map(v => v[key]).filter(a => a !== null)
+      return `${fixed(Math.min(...all), 0)} - ${fixed(Math.max(...all), 0)}`
+    }
+    return table(['', 'deep and superficial veins of all stations', 'published, calf'],
+      [['lying', range('cuff_supine_mmhg'), '20 - 25'], ['sitting', range('cuff_sitting_mmhg'), '50 - 60'], ['standing', range('cuff_standing_mmhg'), 'about 70']])
+  },
+  legs({ legs }) {
+    const row = (name, key, decimals, unit) => [name, ...['least', 'median', 'most'].map(of => `${fixed(legs[key][of], decimals)} ${unit}`)]
+    return table(['', 'least', 'median', 'most'], [
+      row('making a leg and saving it', 'build_s', 2, 's'), row('loading its file', 'load_s', 2, 's'), row('its inside', 'inside_s', 2, 's'), row('memory, with picture', 'memory_mb', 0, 'MB'),
+      row('slow press to 8 N at mid-thigh', 'press_s', 2, 's'), row('vessels below it, the solid factored at once', 'first_update_s', 2, 's'),
+      row('step, median', 'tick_ms', 2, 'ms'), row('step, 99 %', 'tick_p99_ms', 2, 'ms'), row('step, 99.9 %', 'tick_p999_ms', 2, 'ms'), row('step, most', 'tick_max_ms', 2, 'ms'),
+      row('inside and picture, median', 'picture_ms', 1, 'ms'), row('inside and picture, 99 %', 'picture_p99_ms', 1, 'ms')])
+  },
   solver: ({ solver }) => fenced(solver.output),
   accuracy: ({ accuracy }) => fenced(accuracy.output),
 }

@@ -1,0 +1,312 @@
+// bench_closing OUT.csv [SEED [BMI...]]: what closes the veins of drawn limbs at the stations of an
+// examination. For women and men of each body mass index (default 19, 24, 30, 36) a row for each
+// vein of each station: the force of a slow press of the linear probe, lying, at which its area in
+// the image plane passes 5 % of that at rest, what the artery beside it keeps there and what the
+// vein keeps of its area when it is filled by a clot; the cuffs that close it lying, sitting and
+// standing (docs/interior.md).
+#include "sonde/limb_model.h"
+#include "sonde/limb_vessels.h"
+#include "sonde/sonde.h"
+
+#include "interior/interior.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double CLOSED = 0.05, STEP_M = 1.5e-3, DEEPEST_M = 0.060, BEYOND = 1.25, LIFT_M = 2e-3;
+static const double AT_ONCE_S = -1,
+                    LATER_S = 10; // vessels in equilibrium, with a window that stays
+static const double CUFF_MMHG[][2] = {{14, 40}, {28, 90}, {36, 110}}, CUFF_STEP = 2; // by posture
+static const char *const CLOTS[] = {"acute_occlusive", "subacute_occlusive", "chronic_occlusive",
+                                    "partial_mural"};
+enum { CLOT_COUNT = 4, POSTURES = 3, MOST_VEINS = SONDE_LIMB_STATION_VEINS };
+
+typedef struct leg {
+  sonde_model *model;
+  const sonde_limb *limb; // the model's
+  sonde_state *state;
+  sonde_interior *interior;
+  sonde_probe probe;
+  sonde_pathology healthy;
+} leg;
+
+// A vein of a station.
+typedef struct vein {
+  int which, artery;       // numbers of the interior
+  double depth_m, band[2]; // of its front wall along the beam; forces between which it may close
+  bool closed;
+  double area, force_n, artery_area; // of the last look; of closing once it is closed
+  double cuff_mmhg[POSTURES], kept[CLOT_COUNT];
+} vein;
+
+// The interior's number of a vessel of the limb: the longest of its names that the limb's begins
+// with. Names of the interior have '_' for ' ' and may lack last words.
+static int find_vessel(const leg *l, uint32_t vessel) {
+  static const char *const MAIN[2][4] = {
+      {"external_iliac_vein", "common_femoral_vein", "femoral_vein", "popliteal_vein"},
+      {"external_iliac_artery", "common_femoral_artery", "superficial_femoral_artery",
+       "popliteal_artery"}};
+  sonde_limb_vessel v = sonde_limb_vessel_get(l->limb, vessel);
+  for (char *c = v.name; *c; ++c)
+    if (*c == ' ') *c = '_';
+  for (int main = 0; main < 2; ++main)
+    for (int k = 0; k < 4; ++k)
+      if (strcmp(v.name, MAIN[main][k]) == 0) return main;
+  int found = -1;
+  size_t longest = 0;
+  for (int k = 2; k < (int)sonde_interior_vessel_count(l->interior); ++k) {
+    const char *name = sonde_interior_vessel_name(l->interior, k);
+    size_t length = strlen(name);
+    if (length <= longest || strncmp(v.name, name, length) != 0) continue;
+    if (v.name[length] == '\0' || v.name[length] == '_') longest = length, found = k;
+  }
+  return found;
+}
+
+static sonde_vec3 turned(sonde_quat q, sonde_vec3 v) {
+  const sonde_vec3 u = {q.x, q.y, q.z};
+  const sonde_vec3 t = {2 * (u.y * v.z - u.z * v.y), 2 * (u.z * v.x - u.x * v.z),
+                        2 * (u.x * v.y - u.y * v.x)};
+  return (sonde_vec3){v.x + q.w * t.x + u.y * t.z - u.z * t.y,
+                      v.y + q.w * t.y + u.z * t.x - u.x * t.z,
+                      v.z + q.w * t.z + u.x * t.y - u.y * t.x};
+}
+
+// The probe `depth_m` below the skin at a station, whose beam is the limb's; the model's z runs the
+// other way.
+static sonde_pose pose_at(const leg *l, const sonde_limb_station *station, double depth_m) {
+  const sonde_vec3 beam = turned(station->probe.rotation, (sonde_vec3){0, 0, 1});
+  sonde_site site = l->model->sites[0];
+  site.position_m = sonde_limb_to_model(l->limb, station->skin_m);
+  site.normal = (sonde_vec3){-beam.x, -beam.y, beam.z};
+  site.u = (sonde_vec3){beam.y, -beam.x, 0}; // across the leg
+  return sonde_site_pose(&site, depth_m);
+}
+
+static void update(const leg *l, sonde_pose pose, const sonde_pathology *pathology, double dt_s,
+                   double cuff_pa, sonde_posture posture) {
+  sonde_interior_update(
+      l->interior, &(sonde_interior_input){.positions_m = sonde_state_positions(l->state),
+                                           .contact_forces_n = sonde_state_contact_forces(l->state),
+                                           .world_from_probe = pose,
+                                           .pathology = pathology,
+                                           .dt_s = dt_s,
+                                           .face_half_x_m = l->probe.half_x_m,
+                                           .face_half_y_m = l->probe.half_y_m,
+                                           .cuff_pa = cuff_pa,
+                                           .posture = posture});
+}
+
+// Area of a vessel in the image plane over that at rest; NaN: it is not there.
+static double area_of(const leg *l, int which, sonde_pose pose) {
+  sonde_vessel_state v;
+  bool seen = which >= 0 && sonde_interior_vessel_at_plane(l->interior, which, pose, &v);
+  return seen ? v.area_ratio : (double)NAN;
+}
+
+// All veins filled by one clot, or none (NULL).
+static sonde_status fill_veins(const leg *l, const sonde_pathology *clot, sonde_error *error) {
+  static sonde_findings findings;
+  const sonde_thigh_anatomy *a = l->model->anatomy;
+  memset(&findings, 0, sizeof findings);
+  for (uint32_t k = 0; clot && k < a->branch_count; ++k) {
+    if (a->branch[k].kind != SONDE_VESSEL_VEIN) continue;
+    sonde_branch_finding *to = &findings.branch[findings.branch_count++];
+    to->pathology = *clot;
+    memcpy(to->branch, a->branch[k].name, sizeof to->branch);
+  }
+  return sonde_interior_set_findings(l->interior, &findings, error);
+}
+
+// The skin has just been pressed so far that some veins have closed: what clots would keep of them.
+static sonde_status try_clots(const leg *l, sonde_pose pose, vein *veins, uint32_t count,
+                              sonde_error *error) {
+  sonde_status status = SONDE_OK;
+  for (int c = 0; c < CLOT_COUNT && !status; ++c) {
+    sonde_pathology clot;
+    status = sonde_pathology_preset(CLOTS[c], &clot, error);
+    if (!status) status = fill_veins(l, &clot, error);
+    if (status) return status;
+    update(l, pose, &clot, LATER_S, 0, SONDE_POSTURE_SUPINE);
+    for (uint32_t k = 0; k < count; ++k)
+      if (veins[k].closed && isnan(veins[k].kept[c]))
+        veins[k].kept[c] = area_of(l, veins[k].which, pose);
+  }
+  return status ? status : fill_veins(l, NULL, error);
+}
+
+// Presses slowly until all veins of the station are closed, or to 1.25 times the end of the deepest
+// one's band.
+static sonde_status press(const leg *l, const sonde_limb_station *station, vein *veins,
+                          sonde_error *error) {
+  sonde_path_def def = sonde_path_def_default();
+  uint32_t open = station->veins;
+  double most_n = 0;
+  for (uint32_t k = 0; k < station->veins; ++k) most_n = fmax(most_n, BEYOND * veins[k].band[1]);
+  double force_n = 0, dt_s = AT_ONCE_S;
+  sonde_status status = SONDE_OK;
+  def.relative_residual = 1e-4, def.step_m = STEP_M;
+  sonde_state_reset(l->state);
+  for (double depth_m = -LIFT_M; open && depth_m < DEEPEST_M && force_n < most_n && !status;
+       depth_m += STEP_M) {
+    sonde_path_result path;
+    status = sonde_settle_path(l->state, &l->probe, pose_at(l, station, depth_m),
+                               pose_at(l, station, depth_m + STEP_M), &def, NULL, &path, error);
+    if (status || !(path.force_n > 0.05)) continue;
+    update(l, path.pose, &l->healthy, dt_s, 0, SONDE_POSTURE_SUPINE);
+    dt_s = LATER_S;
+    bool closing = false;
+    for (uint32_t k = 0; k < station->veins; ++k) {
+      vein *v = &veins[k];
+      const double area = area_of(l, v->which, path.pose), before = v->area;
+      double artery = area_of(l, v->artery, path.pose);
+      if (isnan(artery)) artery = area_of(l, 1, path.pose);
+      if (v->closed || isnan(area)) continue;
+      // Between two looks force and artery go evenly with the vein's area.
+      const double share = area <= CLOSED ? (before - CLOSED) / (before - area) : 1;
+      v->closed = area <= CLOSED;
+      v->force_n = force_n + share * (path.force_n - force_n);
+      v->artery_area += share * (artery - v->artery_area);
+      v->area = area;
+      open -= v->closed, closing |= v->closed;
+    }
+    force_n = path.force_n;
+    if (closing) status = try_clots(l, path.pose, veins, station->veins, error);
+    if (closing) update(l, path.pose, &l->healthy, LATER_S, 0, SONDE_POSTURE_SUPINE);
+  }
+  return status;
+}
+
+// Cuffs that close the veins of all stations, without a probe.
+static void try_cuffs(const leg *l, const sonde_limb_station *stations, vein (*veins)[MOST_VEINS]) {
+  static const sonde_posture POSTURE[POSTURES] = {SONDE_POSTURE_SUPINE, SONDE_POSTURE_SITTING,
+                                                  SONDE_POSTURE_STANDING};
+  sonde_state_reset(l->state);
+  for (int p = 0; p < POSTURES; ++p) {
+    // The groin's pressure in this posture; the interior adds the blood's weight below it.
+    sonde_circulation still = sonde_circulation_default();
+    sonde_pathology filled = l->healthy;
+    still.posture = POSTURE[p], still.breath_pa = 0;
+    sonde_circulation_apply(&still, 0, 1e-3, &filled);
+    double before[SONDE_LIMB_STATIONS][MOST_VEINS];
+    for (double cuff = CUFF_MMHG[p][0]; cuff <= CUFF_MMHG[p][1]; cuff += CUFF_STEP) {
+      update(l, pose_at(l, stations, -LIFT_M), &filled, AT_ONCE_S, cuff * SONDE_PA_PER_MMHG,
+             POSTURE[p]);
+      for (int s = 0; s < SONDE_LIMB_STATIONS; ++s)
+        for (uint32_t k = 0; k < stations[s].veins; ++k) {
+          vein *v = &veins[s][k];
+          double area = area_of(l, v->which, pose_at(l, &stations[s], 0)), was = before[s][k];
+          before[s][k] = area;
+          if (!isnan(v->cuff_mmhg[p]) || !(area <= CLOSED)) continue;
+          double back = cuff > CUFF_MMHG[p][0] ? (CLOSED - area) / (was - area) : 0;
+          v->cuff_mmhg[p] = cuff - back * CUFF_STEP;
+        }
+    }
+  }
+}
+
+static void write_number(FILE *out, double value, const char *format) {
+  fputc(',', out);
+  if (isfinite(value)) fprintf(out, format, value);
+}
+
+static void write_rows(FILE *out, const leg *l, const char *sex, double bmi,
+                       const sonde_limb_station *stations, vein (*veins)[MOST_VEINS]) {
+  for (int s = 0; s < SONDE_LIMB_STATIONS; ++s)
+    for (uint32_t k = 0; k < stations[s].veins; ++k) {
+      const vein *v = &veins[s][k];
+      const sonde_limb_station *at = &stations[s];
+      if (isnan(v->cuff_mmhg[0])) continue; // the plane of the picture does not meet it
+      char name[64];                        // no commas in a table
+      snprintf(name, sizeof name, "%s", at->name);
+      for (char *c = strchr(name, ','); c; c = strchr(c, ',')) memmove(c, c + 1, strlen(c));
+      fprintf(out, "%s,%g,%s,%s,%.1f,%.2f,%.2f,%d,%.4f,%.2f", sex, bmi, name,
+              sonde_limb_vessel_get(l->limb, at->vein[k]).name, 1e3 * v->depth_m, v->band[0],
+              v->band[1], v->closed, v->area, v->force_n);
+      write_number(out, v->artery_area, "%.3f");
+      for (int c = 0; c < CLOT_COUNT; ++c) write_number(out, v->kept[c], "%.3f");
+      for (int p = 0; p < POSTURES; ++p) write_number(out, v->cuff_mmhg[p], "%.1f");
+      fputc('\n', out);
+    }
+  fflush(out);
+}
+
+static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
+                            sonde_error *error) {
+  leg l = {0};
+  vein veins[SONDE_LIMB_STATIONS][MOST_VEINS];
+  sonde_limb_station stations[SONDE_LIMB_STATIONS];
+  sonde_limb_body body = sonde_limb_unknown();
+  const sonde_limb_model_def def = sonde_limb_model_def_default();
+  sonde_world_def world = sonde_world_def_default();
+  world.engine = SONDE_ENGINE_DOUBLE; // nothing but equilibria
+  body.sex = sex, body.bmi = bmi;
+  sonde_status status = sonde_limb_draw(&body, seed, &body, error);
+  if (!status) status = sonde_limb_model(&body, &def, &l.model, error);
+  if (!status) status = sonde_probe_create("linear", &l.probe, error);
+  if (!status) status = sonde_state_create(l.model, &world, &l.state, error);
+  if (!status) status = sonde_interior_create(l.model, &l.interior, error);
+  if (!status) status = sonde_pathology_preset("healthy", &l.healthy, error);
+  if (!status) {
+    sonde_interior_for_vessels(l.interior, true);
+    l.limb = sonde_limb_of(l.model);
+    sonde_limb_stations(l.limb, stations);
+    for (int s = 0; s < SONDE_LIMB_STATIONS; ++s)
+      for (uint32_t k = 0; k < stations[s].veins; ++k) {
+        uint32_t mate = sonde_limb_vessel_get(l.limb, stations[s].vein[k]).mate;
+        vein *v = &veins[s][k];
+        *v = (vein){.area = 1, .artery_area = 1, .which = find_vessel(&l, stations[s].vein[k])};
+        // Each vein has a depth of its own along the station's beam.
+        const sonde_limb_station *at = &stations[s];
+        const sonde_limb_vessel_point place =
+            sonde_limb_vessel_place(l.limb, at->vein[k], at->arc_m[k]);
+        const sonde_vec3 beam = turned(at->probe.rotation, (sonde_vec3){0, 0, 1});
+        v->depth_m = (place.centre_m.x - at->skin_m.x) * beam.x +
+                     (place.centre_m.y - at->skin_m.y) * beam.y +
+                     (place.centre_m.z - at->skin_m.z) * beam.z - place.radius_m;
+        v->depth_m = fmax(v->depth_m, 1e-3);
+        sonde_limb_force_band(v->depth_m, v->band);
+        v->artery = mate == SONDE_LIMB_NO_VESSEL ? 1 : find_vessel(&l, mate);
+        for (int c = 0; c < CLOT_COUNT; ++c) v->kept[c] = (double)NAN;
+        for (int p = 0; p < POSTURES; ++p) v->cuff_mmhg[p] = (double)NAN;
+      }
+    try_cuffs(&l, stations, veins);
+  }
+  for (int s = 0; s < SONDE_LIMB_STATIONS && !status; ++s)
+    status = press(&l, &stations[s], veins[s], error);
+  if (!status) write_rows(out, &l, sex == SONDE_SEX_MALE ? "male" : "female", bmi, stations, veins);
+  sonde_interior_destroy(l.interior);
+  sonde_state_destroy(l.state);
+  sonde_probe_clear(&l.probe);
+  sonde_model_destroy(l.model);
+  return status;
+}
+
+int main(int argc, char **argv) {
+  static const double USUAL[] = {19, 24, 30, 36};
+  const long seed = argc > 2 ? atol(argv[2]) : 1;
+  const int count = argc > 3 ? argc - 3 : 4;
+  if (argc < 2 || seed < 0) {
+    fprintf(stderr, "usage: bench_closing OUT.csv [SEED [BMI...]]\n");
+    return 2;
+  }
+  FILE *out = fopen(argv[1], "w");
+  if (!out) {
+    fprintf(stderr, "bench_closing: %s cannot be written\n", argv[1]);
+    return 1;
+  }
+  fprintf(out, "sex,bmi,station,vein,depth_mm,least_n,most_n,closed,area,force_n,artery");
+  for (int c = 0; c < CLOT_COUNT; ++c) fprintf(out, ",%s", CLOTS[c]);
+  fprintf(out, ",cuff_supine_mmhg,cuff_sitting_mmhg,cuff_standing_mmhg\n");
+  sonde_error error = {0};
+  sonde_status status = SONDE_OK;
+  for (int k = 0; k < count && !status; ++k)
+    for (int sex = 0; sex < 2 && !status; ++sex)
+      status =
+          measure(out, sex ? SONDE_SEX_MALE : SONDE_SEX_FEMALE,
+                  argc > 3 ? atof(argv[3 + k]) : USUAL[k], (uint64_t)(seed + 2 * k + sex), &error);
+  if (status) fprintf(stderr, "bench_closing: %s\n", error.message);
+  return fclose(out) != 0 || status;
+}
