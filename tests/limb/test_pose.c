@@ -474,9 +474,16 @@ static void a_left_limb_lies_as_the_mirror(void **state) {
 }
 
 // Nothing of the limb, the bed or the other leg is where the probe's body is: 60 x 30 mm, 130 mm
-// long, from a face of 45 x 12 mm.
+// long, from a face of 45 x 12 mm. Of each station in its position, and of those that the protocol
+// of the whole leg examines in another.
 static void probes_reach_every_station(void **state) {
   (void)state;
+  static const struct {
+    uint32_t station;
+    sonde_limb_position position;
+  } MORE[] = {{10, SONDE_LIMB_SUPINE_TURNED}, // posterior tibial
+              {11, SONDE_LIMB_PRONE_BENT},    // peroneal
+              {12, SONDE_LIMB_PRONE_BENT}};   // gastrocnemius
   uint32_t blocked = 0, all = 0;
   double sunk = 0;
   for (uint32_t k = 0; k < FAMILY; ++k) {
@@ -484,8 +491,12 @@ static void probes_reach_every_station(void **state) {
     sonde_limb_stations(family[k], station);
     double out = family[k]->body.side == SONDE_LIMB_LEFT ? -1 : 1;
     double midline = out * 0.088 * family[k]->scale;
-    for (uint32_t n = 0; n < SONDE_LIMB_STATIONS; ++n, ++all) {
-      const sonde_limb_pose *pose = posed[k][station[n].position];
+    for (uint32_t i = 0; i < SONDE_LIMB_STATIONS + SONDE_COUNT_OF(MORE); ++i, ++all) {
+      const bool own = i < SONDE_LIMB_STATIONS;
+      const uint32_t n = own ? i : MORE[i - SONDE_LIMB_STATIONS].station;
+      const sonde_limb_position position =
+          own ? station[n].position : MORE[i - SONDE_LIMB_STATIONS].position;
+      const sonde_limb_pose *pose = posed[k][position];
       sonde_limb_station here[SONDE_LIMB_STATIONS];
       sonde_limb_pose_stations(pose, here);
       const sonde_limb_station *s = &here[n];
@@ -511,8 +522,8 @@ static void probes_reach_every_station(void **state) {
       assert_true(sonde_limb_pose_reaches(pose, s->probe) == !what || most > 0.0075);
       if (!what) continue;
       ++blocked;
-      print_message("member %u, %s, %s: %s is in the probe\n", k, name_of((int)s->position),
-                    s->name, what);
+      print_message("member %u, %s, %s: %s is in the probe\n", k, name_of((int)position), s->name,
+                    what);
     }
   }
   print_message("%u of %u probes blocked, edges sink %.1f mm\n", blocked, all, 1e3 * sunk);
