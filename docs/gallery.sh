@@ -24,7 +24,7 @@ for state in healthy acute:acute_occlusive chronic:chronic_occlusive; do
   shoot "${state%:*}_pressed" "$@" --force-n 7
 done
 shoot healthy_along "$model" --site 27 --depth-mm 50 --turn-deg 90 --force-n 2
-shoot healthy_curved "$model" --site 27 --curved-mm 60 --aperture-mm 60 --frequency-mhz 4 \
+shoot healthy_curved "$model" --site 27 --scanner abdominal --curved-mm 60 --aperture-mm 60 --frequency-mhz 4 \
   --focus-mm 40 --depth-mm 90 --force-n 2
 
 "$sonde" generate --seed 3 --sex female --fat-mm 26 -o "$models/fat"
