@@ -258,7 +258,7 @@ const GROUPS = {
     sources: ['src/sonde-limb', 'src/sonde/interior', 'src/sonde/echo', ...engine, 'bench/bench_legs.c'],
     measure(bin) {
       const rows = table_of(bin, 'bench_legs')
-      return Object.fromEntries(Object.keys(rows[0]).filter(key => key !== 'seed').map(key => [key, spread(rows, r => Number(r[key]))]))
+      return { count: rows.length, ...Object.fromEntries(Object.keys(rows[0]).filter(key => key !== 'seed').map(key => [key, spread(rows, r => Number(r[key]))])) }
     },
   },
   hostile: {
