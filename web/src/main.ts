@@ -239,13 +239,12 @@ class App {
     if (probe && probe !== controls.probe) this.connection.probe(probe);
     if (wantedCase && wantedCase !== controls.case) this.connection.pathology(wantedCase);
     const depth = Number.parseFloat(query.get("depth") ?? "");
-    // Where the program has the probe over this leg; where it was over another says nothing.
-    this.snapshot = null;
-    this.route.forget();
     const limb = this.phase === "practice" ? undefined : this.hello?.limb;
     const home = limb ? (START_SITE[limb.position] ?? GROIN_SITE) : HOME_SITE;
     this.setSite(Number.parseInt(query.get("site") ?? `${home}`, 10));
     this.setDepth(Number.isFinite(depth) ? depth : LIFTED_MM);
+    // The program has the probe there; where it was over another limb says nothing of the way.
+    if (limb) this.route.forget();
     for (const key of ["probe", "case", "depth", "site"]) query.delete(key); // once
   }
 
