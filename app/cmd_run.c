@@ -17,7 +17,7 @@ enum { MAX_PROBES = 16 };
 typedef struct options {
   const char *model, *record, *probe, *pathology, *preset, *compare;
   const char *trainee, *exams, *cases, *protocols, *scanner;
-  long port;
+  long port, images_hz;
   double seconds, gel_m3;
   bool headless, lockstep, json, no_gel, circulate;
   sonde_posture posture;
@@ -25,6 +25,7 @@ typedef struct options {
 } options;
 
 static const options DEFAULTS = {.port = 8642,
+                                 .images_hz = 50,
                                  .scanner = "venous",
                                  .seconds = 10.0,
                                  .probe = "linear",
@@ -52,6 +53,8 @@ static const app_option TABLE[] = {
              "a second preset, which the controls of the page can change over to"),
     OPT_TEXT(scanner, "scanner", "NAME|FILE",
              "a scanner that ships (sonde scanner list) or a file; default venous"),
+    OPT_INTEGER(images_hz, "images-hz", "N", 1, 50,
+                "images per second at most: fewer leave more of a slow processor to the force"),
     OPT_REAL(gel_m3, "gel-ml", "V", 0, 1000, 1e-6,
              "gel spread over the sites at the start; 0: dry skin"),
     OPT_FLAG(no_gel, "no-gel", "no gel is simulated: every line of the image is coupled"),
@@ -355,6 +358,7 @@ static int run(void *from) {
   def.record_path = s->record;
   def.controls.gel = !s->no_gel;
   def.gel_m3 = s->gel_m3;
+  def.ticks_per_image = (uint32_t)lround(1 / (def.world.dt_s * (double)s->images_hz));
   sonde_scanner scanner;
   def.circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
   def.controls.posture = s->posture;

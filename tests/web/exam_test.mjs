@@ -7,7 +7,7 @@ import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, turnAcross, turnPatient } from "./drive.mjs";
-import { startRun } from "./program.mjs";
+import { FEW_IMAGES, startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -24,7 +24,7 @@ const check = (condition, what) => {
   console.log(`ok ${what}`);
 };
 
-const start = (port) => startRun(sonde, ["--port", String(port), "--exams", exams]);
+const start = (port) => startRun(sonde, ["--port", String(port), "--exams", exams, ...FEW_IMAGES]);
 
 const state = (page) => page.evaluate(() => ({ exam: window.sonde.exam, replay: window.sonde.replay, snapshot: window.sonde.snapshot, sum: window.sonde.imageSum }));
 const until = (page, condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });

@@ -527,7 +527,7 @@ class App {
     this.pending = null;
     if (frame) this.show(frame);
     if (frame) this.connection.ack(frame.sequence); // before the leg: image and force do not wait for it
-    if (this.imaged) this.scene.render(); // its first picture takes long: the image goes before it
+    if (this.imaged) this.scene.render(now_s); // its first picture takes long: the image goes before it
     this.imaged = this.frames > 0;
     this.nameTarget();
     this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms);

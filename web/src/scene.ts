@@ -15,6 +15,7 @@ import { TargetMark } from "./target";
 import { PART, type Frame, type LimbInfo, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
 
 const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
+const LOW_INTERVAL_S = 1 / 8; // between two pictures of the leg with low quality
 const FOV_DEG = 27;
 const WIDE = 1.3; // width over height in which the whole leg is seen
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
@@ -109,6 +110,7 @@ export class LegScene {
   private range_mm = 10;
   private through = true;
   private dirty = true;
+  private drawn_s = -Infinity;
   private flat: FlatView | null = null; // draws while there is no WebGL
   private readonly vessels = new Map<number, FlatVessel>();
   private sites: readonly Site[] = [];
@@ -553,7 +555,7 @@ export class LegScene {
       const context = canvas.getContext("webgl2", settings) as WebGL2RenderingContext | null; // three.js would say on the console that there is none
       if (!context) return null;
       const renderer = new THREE.WebGLRenderer({ canvas, context, ...settings });
-      renderer.setPixelRatio(low ? 1 : Math.min(2, window.devicePixelRatio));
+      renderer.setPixelRatio(low ? 0.5 : Math.min(2, window.devicePixelRatio));
       return renderer;
     } catch {
       return null;
@@ -591,9 +593,12 @@ export class LegScene {
     if (!drawn) this.dirty = true;
   }
 
-  render(): void {
-    if (!this.dirty) return;
+  /** Draws the leg if it has changed; with low quality at most 8 times a second, so that image and force have
+   *  the processor where it also does a graphics card's work. */
+  render(now_s: number): void {
+    if (!this.dirty || (this.low && now_s - this.drawn_s < LOW_INTERVAL_S)) return;
     this.dirty = false;
+    this.drawn_s = now_s;
     if (!this.renderer && !this.isFlat) {
       this.renderer = this.makeRenderer();
       if (!this.renderer) this.setFlat(true);
