@@ -102,7 +102,7 @@ static void both_probes_determine_more_than_one(void **state) {
 static void random_starts_end_in_one_optimum(void **state) {
   (void)state;
   const char *wanted = getenv("SONDE_TEST_RUNS");
-  uint32_t count = wanted ? (uint32_t)atoi(wanted) : 8;
+  uint32_t count = wanted ? (uint32_t)atoi(wanted) : 4;
   nine t;
   nine_create(&t);
   sonde_fit_starts ends, again;

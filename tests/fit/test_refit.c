@@ -96,7 +96,7 @@ static uint32_t covered(const sonde_fit_result *r, const sonde_fit_result *truth
 static void intervals_cover_the_truth(void **state) {
   (void)state;
   const char *wanted = getenv("SONDE_TEST_RUNS");
-  uint32_t runs = wanted ? (uint32_t)atoi(wanted) : 6, in = 0, all = 0;
+  uint32_t runs = wanted ? (uint32_t)atoi(wanted) : 3, in = 0, all = 0;
   bundled b = bundled_load("indentation.csv", 6.0);
   keep_nine_sites(&b);
   sonde_fit_def def = sonde_fit_def_default();

@@ -6,7 +6,7 @@
 #include "limb/pose.h"
 #include "limb/vessels_graph.h"
 
-enum { FAMILY = 6 };
+enum { FAMILY = 4 };
 static sonde_limb *family[FAMILY];
 static sonde_limb_pose *posed[FAMILY][SONDE_LIMB_POSITIONS];
 

@@ -4,7 +4,7 @@
 
 #include "limb/bones.h"
 
-enum { FAMILY = 60, WHOLE = 12 };
+enum { FAMILY = 24, WHOLE = 6 };
 static sonde_limb *family[FAMILY]; // right limbs, bones and surfaces alone
 static sonde_limb *whole[WHOLE];   // the first of them with vessels and muscles
 

@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-enum { FAMILY = 40, POPULATION = 600 };
+enum { FAMILY = 20, POPULATION = 600 };
 
 static sonde_limb *member(uint32_t k, sonde_limb_side side) { return bare_limb(k, 1000, side); }
 

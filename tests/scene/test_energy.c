@@ -61,11 +61,11 @@ static void falls(const char *directory, const char *name, uint32_t count, doubl
 
 static void test_shipped(void **unused) {
   (void)unused;
-  falls(DATA, "stack", 600, 1e-9);
-  falls(DATA, "incline", 600, 1e-9);
-  falls(DATA, "four_kinds", ROUNDS(800, 100), 1e-9);
-  falls(DATA, "drape", ROUNDS(600, 60), 1e-9);
-  falls(DATA, "thigh_drop", ROUNDS(300, 30), 1e-9);
+  falls(DATA, "stack", 300, 1e-9);
+  falls(DATA, "incline", 300, 1e-9);
+  falls(DATA, "four_kinds", ROUNDS(400, 100), 1e-9);
+  falls(DATA, "drape", ROUNDS(300, 60), 1e-9);
+  falls(DATA, "thigh_drop", ROUNDS(120, 30), 1e-9);
 }
 
 // The thigh under a ball as shipped, against the same steps solved closer and without sleep.
@@ -86,7 +86,7 @@ static void test_thigh_asleep(void **unused) {
   }
   double off = 0;
   uint32_t nodes = sonde_scene_body(w[0].scene, 0).node_count;
-  for (uint32_t k = 0; k < ROUNDS(200, 10); ++k) {
+  for (uint32_t k = 0; k < ROUNDS(80, 10); ++k) {
     steps(&w[0], 1);
     steps(&w[1], 1);
     const sonde_vec3 *x = sonde_scene_nodes(w[0].state, 0), *y = sonde_scene_nodes(w[1].state, 0);
@@ -103,9 +103,9 @@ static void test_thigh_asleep(void **unused) {
 
 static void test_hostile(void **unused) {
   (void)unused;
-  falls(HOSTILE, "inside", 600, 1e-9);
-  falls(HOSTILE, "fallen", 600, 1e-9);
-  falls(HOSTILE, "sheet", ROUNDS(300, 100), 1e-9);
+  falls(HOSTILE, "inside", 300, 1e-9);
+  falls(HOSTILE, "fallen", 300, 1e-9);
+  falls(HOSTILE, "sheet", ROUNDS(150, 100), 1e-9);
 }
 
 int main(int argc, char **argv) {
