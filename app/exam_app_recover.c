@@ -125,7 +125,7 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
 
 void exam_recover_log(const char *exams, sonde_exam_log *log, exam_recovered *found) {
   // Keyframes, result, table and report are made again.
-  static const char *const MADE[] = {"exam.rec.keys", "exam.json", "exam.csv", "report.html"};
+  static const char *const MADE[] = {"exam.json", "exam.csv", "report.html"};
   *found = (exam_recovered){0};
   DIR *list = opendir(exams);
   for (const struct dirent *item; list && (item = readdir(list));) {
@@ -148,6 +148,11 @@ void exam_recover_log(const char *exams, sonde_exam_log *log, exam_recovered *fo
     // Nothing is left of what a killed program had begun.
     for (size_t k = 0; k < sizeof MADE / sizeof MADE[0]; ++k)
       (void)sonde_file_remove_abandoned(exam_app_path(path, directory, MADE[k]));
+    for (uint32_t part = exam_part_count(directory); part >= 1; --part) {
+      char keys[EXAM_PATH];
+      snprintf(keys, sizeof keys, "%s.keys", exam_part_path(path, directory, part));
+      (void)sonde_file_remove_abandoned(keys);
+    }
     if (sonde_exam_log_has(log, id, &there, &error) || there) continue;
     if (!read_entry(directory, id, &entry, found)) continue;
     if (sonde_exam_log_add(log, &entry, &error))

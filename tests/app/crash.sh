@@ -35,7 +35,7 @@ faulty() {
   local how=$1 at=$2
   shift 2
   status=0
-  { timeout 120 env LD_PRELOAD="$FAULTS" DISK_FAULTS_HOW="$how" DISK_FAULTS_AT="$at" \
+  { timeout 600 env LD_PRELOAD="$FAULTS" DISK_FAULTS_HOW="$how" DISK_FAULTS_AT="$at" \
     DISK_FAULTS_COUNT="$work/count" "$@" >"$work/told" 2>"$work/err" </dev/null; } 2>/dev/null ||
     status=$?
 }
