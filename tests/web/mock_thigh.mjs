@@ -8,7 +8,7 @@ const MM_PER_RING = 10;
 const RADIUS = (z) => 84 - 0.08 * z;
 const VEIN = { x: 6, below: 21, radius: 5 };
 const ARTERY = { x: 19, below: 19, radius: 3.8 };
-const FRAME_MS = 100;
+const FRAME_MS = 50;
 const SPEED_MM_S = 260;
 const PX_PER_MM = 4;
 const WIDTH_MM = 60;

@@ -22,7 +22,7 @@ const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to 
 const MOVED_ALPHA = 0.86;
 const CREASE_RAD = 0.6; // sharper edges are drawn sharp
 const SEEN_COSINE = 0.4; // between the view and the normal of a place: less is on the far side
-const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.7; // of the leg's length: what the camera looks at, and from how far
+const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.9; // of the leg's length: what the camera looks at, and from how far
 const FARTHEST_MM = 2000; // of the camera from the leg
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
@@ -177,7 +177,7 @@ export class LegScene {
     let low = Infinity, high = -Infinity;
     for (let i = 2; i < mesh.points.length; i += 3) (low = Math.min(low, mesh.points[i]!)), (high = Math.max(high, mesh.points[i]!));
     const middle = low + MIDDLE_SHARE * (high - low), away = Math.min(FARTHEST_MM, AWAY_SHARE * (high - low));
-    const key = `${this.limb?.side} ${this.limb?.position}`;
+    const key = this.limb ? `${this.limb.side} ${this.limb.position}` : "";
     const other = Math.abs(away - this.away_mm) > 0.3 * this.away_mm || key !== this.seen;
     (this.seen = key), (this.away_mm = away);
     this.centre.set(12, -8, middle);
