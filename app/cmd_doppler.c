@@ -149,7 +149,7 @@ static sonde_status run_blood(const options *a, const sonde_model *model, blood 
   sonde_flow_segment segment = (sonde_flow_segment)(artery ? SONDE_FLOW_COMMON_FEMORAL : a->vessel);
   sonde_flow_def *flow = &b->flow;
   *flow = sonde_flow_def_default(limb);
-  if (sonde_limb_pose_of(model)) sonde_flow_def_hold(sonde_limb_pose_of(model), flow);
+  sonde_flow_def_hold(sonde_limb_pose_of(model), flow);
   for (int v = 0; v < SONDE_FLOW_VEINS && a->clot >= 0; ++v)
     flow->closed[a->clot][v] = a->clot_share;
   flow->leak = a->leak;
@@ -352,9 +352,8 @@ static int run(void *from) {
   }
   readings x = read_off(a, &r);
   const bool is_limb = limb != NULL;
-  const sonde_limb_pose *pose = sonde_limb_pose_of(model);
-  sonde_limb_position position = SONDE_LIMB_POSITIONS;
-  if (pose) position = sonde_limb_pose_setting(pose).position;
+  const sonde_limb_position position = sonde_limb_position_of(model);
+  const bool posed = position != SONDE_LIMB_POSITIONS;
   double phasicity = (x.most - x.least) / x.mean;
   if (a->json) {
     app_json_begin();
@@ -364,7 +363,7 @@ static int run(void *from) {
              100 * x.least, 100 * x.most, phasicity, 100 * x.peak);
     if (a->vessel != SONDE_FLOW_SEGMENTS)
       app_json("venous_mmhg:%g", r.pressure_pa / SONDE_PA_PER_MMHG);
-    if (pose) app_json_text("position", sonde_limb_position_name(position));
+    if (posed) app_json_text("position", sonde_limb_position_name(position));
     app_json("augmentation:%g reflux_s:%g true_mean_cm_s:%g true_phasicity:%g true_reflux_s:%g",
              x.augmentation, x.reflux, 100 * x.truth_mean, x.truth_phasicity, x.truth_reflux);
     app_json_end();
@@ -372,7 +371,7 @@ static int run(void *from) {
     printf("%s: at rest %.1f cm/s in the gate (%.1f to %.1f with breath and beat, phasicity %.2f), "
            "peak %.1f cm/s\n",
            VESSELS[a->vessel], 100 * x.mean, 100 * x.least, 100 * x.most, phasicity, 100 * x.peak);
-    if (pose)
+    if (posed)
       printf("%s: %.0f mmHg in the vein\n", sonde_limb_position_name(position),
              r.pressure_pa / SONDE_PA_PER_MMHG);
     printf("mean over the lumen in truth %.1f cm/s; velocities beyond %.0f cm/s are folded\n",

@@ -164,7 +164,7 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
   const sonde_limb *limb = sonde_limb_of(s->model);
   sonde_flow_def blood = sonde_flow_def_default(limb);
   sonde_flow flow;
-  if (sonde_limb_pose_of(s->model)) sonde_flow_def_hold(sonde_limb_pose_of(s->model), &blood);
+  sonde_flow_def_hold(sonde_limb_pose_of(s->model), &blood);
   if (!isnan(of->squeeze_s)) blood.squeeze_from_s = of->squeeze_s;
   sonde_status status = sonde_flow_scene_create(limb, s->interior, &scene, error);
   if (!status) sonde_flow_scene_narrow(scene, &blood);

@@ -9,6 +9,7 @@
 #include "sonde/sonde.h"
 
 #include "interior/interior.h"
+#include "pose.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,6 +27,7 @@ enum { CLOT_COUNT = 4, POSTURES = 3, MOST_VEINS = SONDE_LIMB_STATION_VEINS };
 typedef struct leg {
   sonde_model *model;
   const sonde_limb *limb; // the model's
+  sonde_vein_map map;     // with its stations
   sonde_state *state;
   sonde_interior *interior;
   sonde_probe probe;
@@ -65,24 +67,10 @@ static int find_vessel(const leg *l, uint32_t vessel) {
   return found;
 }
 
-static sonde_vec3 turned(sonde_quat q, sonde_vec3 v) {
-  const sonde_vec3 u = {q.x, q.y, q.z};
-  const sonde_vec3 t = {2 * (u.y * v.z - u.z * v.y), 2 * (u.z * v.x - u.x * v.z),
-                        2 * (u.x * v.y - u.y * v.x)};
-  return (sonde_vec3){v.x + q.w * t.x + u.y * t.z - u.z * t.y,
-                      v.y + q.w * t.y + u.z * t.x - u.x * t.z,
-                      v.z + q.w * t.z + u.x * t.y - u.y * t.x};
-}
-
-// The probe `depth_m` below the skin at a station, whose beam is the limb's; the model's z runs the
-// other way.
-static sonde_pose pose_at(const leg *l, const sonde_limb_station *station, double depth_m) {
-  const sonde_vec3 beam = turned(station->probe.rotation, (sonde_vec3){0, 0, 1});
-  sonde_site site = l->model->sites[0];
-  site.position_m = sonde_limb_to_model(l->limb, station->skin_m);
-  site.normal = (sonde_vec3){-beam.x, -beam.y, beam.z};
-  site.u = (sonde_vec3){beam.y, -beam.x, 0}; // across the leg
-  return sonde_site_pose(&site, depth_m);
+// The probe `depth_m` below the skin at a station.
+static sonde_pose pose_at(const leg *l, int station, double depth_m) {
+  const sonde_pose on = l->map.station[station].probe;
+  return pose_shift(on, depth_m, pose_axis(on, 2));
 }
 
 static void update(const leg *l, sonde_pose pose, const sonde_pathology *pathology, double dt_s,
@@ -139,12 +127,12 @@ static sonde_status try_clots(const leg *l, sonde_pose pose, vein *veins, uint32
 
 // Presses slowly until all veins of the station are closed, or to 1.25 times the end of the deepest
 // one's band.
-static sonde_status press(const leg *l, const sonde_limb_station *station, vein *veins,
+static sonde_status press(const leg *l, int station, uint32_t count, vein *veins,
                           sonde_error *error) {
   sonde_path_def def = sonde_path_def_default();
-  uint32_t open = station->veins;
+  uint32_t open = count;
   double most_n = 0;
-  for (uint32_t k = 0; k < station->veins; ++k) most_n = fmax(most_n, BEYOND * veins[k].band[1]);
+  for (uint32_t k = 0; k < count; ++k) most_n = fmax(most_n, BEYOND * veins[k].band[1]);
   double force_n = 0, dt_s = AT_ONCE_S;
   sonde_status status = SONDE_OK;
   def.relative_residual = 1e-4, def.step_m = STEP_M;
@@ -158,7 +146,7 @@ static sonde_status press(const leg *l, const sonde_limb_station *station, vein 
     update(l, path.pose, &l->healthy, dt_s, 0, SONDE_POSTURE_SUPINE);
     dt_s = LATER_S;
     bool closing = false;
-    for (uint32_t k = 0; k < station->veins; ++k) {
+    for (uint32_t k = 0; k < count; ++k) {
       vein *v = &veins[k];
       const double area = area_of(l, v->which, path.pose), before = v->area;
       double artery = area_of(l, v->artery, path.pose);
@@ -173,7 +161,7 @@ static sonde_status press(const leg *l, const sonde_limb_station *station, vein 
       open -= v->closed, closing |= v->closed;
     }
     force_n = path.force_n;
-    if (closing) status = try_clots(l, path.pose, veins, station->veins, error);
+    if (closing) status = try_clots(l, path.pose, veins, count, error);
     if (closing) update(l, path.pose, &l->healthy, LATER_S, 0, SONDE_POSTURE_SUPINE);
   }
   return status;
@@ -192,12 +180,11 @@ static void try_cuffs(const leg *l, const sonde_limb_station *stations, vein (*v
     sonde_circulation_apply(&still, 0, 1e-3, &filled);
     double before[SONDE_LIMB_STATIONS][MOST_VEINS];
     for (double cuff = CUFF_MMHG[p][0]; cuff <= CUFF_MMHG[p][1]; cuff += CUFF_STEP) {
-      update(l, pose_at(l, stations, -LIFT_M), &filled, AT_ONCE_S, cuff * SONDE_PA_PER_MMHG,
-             POSTURE[p]);
+      update(l, pose_at(l, 0, -LIFT_M), &filled, AT_ONCE_S, cuff * SONDE_PA_PER_MMHG, POSTURE[p]);
       for (int s = 0; s < SONDE_LIMB_STATIONS; ++s)
         for (uint32_t k = 0; k < stations[s].veins; ++k) {
           vein *v = &veins[s][k];
-          double area = area_of(l, v->which, pose_at(l, &stations[s], 0)), was = before[s][k];
+          double area = area_of(l, v->which, pose_at(l, s, 0)), was = before[s][k];
           before[s][k] = area;
           if (!isnan(v->cuff_mmhg[p]) || !(area <= CLOSED)) continue;
           double back = cuff > CUFF_MMHG[p][0] ? (CLOSED - area) / (was - area) : 0;
@@ -235,7 +222,8 @@ static void write_rows(FILE *out, const leg *l, const char *sex, double bmi,
 
 static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
                             sonde_error *error) {
-  leg l = {0};
+  static leg l;
+  l = (leg){0};
   vein veins[SONDE_LIMB_STATIONS][MOST_VEINS];
   sonde_limb_station stations[SONDE_LIMB_STATIONS];
   sonde_limb_body body = sonde_limb_unknown();
@@ -245,6 +233,7 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
   body.sex = sex, body.bmi = bmi;
   sonde_status status = sonde_limb_draw(&body, seed, &body, error);
   if (!status) status = sonde_limb_model(&body, &def, &l.model, error);
+  if (!status) status = sonde_vein_map_make(l.model, &l.map, error);
   if (!status) status = sonde_probe_create("linear", &l.probe, error);
   if (!status) status = sonde_state_create(l.model, &world, &l.state, error);
   if (!status) status = sonde_interior_create(l.model, &l.interior, error);
@@ -262,11 +251,10 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
         const sonde_limb_station *at = &stations[s];
         const sonde_limb_vessel_point place =
             sonde_limb_vessel_place(l.limb, at->vein[k], at->arc_m[k]);
-        const sonde_vec3 beam = turned(at->probe.rotation, (sonde_vec3){0, 0, 1});
-        v->depth_m = (place.centre_m.x - at->skin_m.x) * beam.x +
-                     (place.centre_m.y - at->skin_m.y) * beam.y +
-                     (place.centre_m.z - at->skin_m.z) * beam.z - place.radius_m;
-        v->depth_m = fmax(v->depth_m, 1e-3);
+        const sonde_vec3 beam = pose_axis(at->probe, 2);
+        const double front_m =
+            vec_dot(place.centre_m, beam) - vec_dot(at->skin_m, beam) - place.radius_m;
+        v->depth_m = fmax(front_m, 1e-3);
         sonde_limb_force_band(v->depth_m, v->band);
         v->artery = mate == SONDE_LIMB_NO_VESSEL ? 1 : find_vessel(&l, mate);
         for (int c = 0; c < CLOT_COUNT; ++c) v->kept[c] = (double)NAN;
@@ -275,7 +263,7 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
     try_cuffs(&l, stations, veins);
   }
   for (int s = 0; s < SONDE_LIMB_STATIONS && !status; ++s)
-    status = press(&l, &stations[s], veins[s], error);
+    status = press(&l, s, stations[s].veins, veins[s], error);
   if (!status) write_rows(out, &l, sex == SONDE_SEX_MALE ? "male" : "female", bmi, stations, veins);
   sonde_interior_destroy(l.interior);
   sonde_state_destroy(l.state);

@@ -4,25 +4,15 @@
 // Each figure is the median of REPEATS runs.
 #include <sonde/sonde.h>
 
+#include "bench.h"
+
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 enum { REPEATS = 9, QUERIES = 20000 };
 
-static double processor_seconds(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static int by_value(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 static double median(double *seconds) {
-  qsort(seconds, REPEATS, sizeof *seconds, by_value);
+  bench_sort(seconds, REPEATS);
   return seconds[REPEATS / 2];
 }
 
@@ -39,16 +29,16 @@ int main(int count, char **arguments) {
   for (int k = 0; k < REPEATS; ++k) {
     sonde_mesh mesh;
     sonde_surface_index *index;
-    double start_s = processor_seconds();
+    double start_s = bench_seconds();
     if (sonde_mesh_load(arguments[1], unit_m, &mesh, &error)) break;
-    read_s[k] = processor_seconds() - start_s;
-    start_s = processor_seconds();
+    read_s[k] = bench_seconds() - start_s;
+    start_s = bench_seconds();
     sonde_status status = sonde_surface_index_create(&mesh, &index, &error);
-    index_s[k] = processor_seconds() - start_s;
+    index_s[k] = bench_seconds() - start_s;
     faces = mesh.face_count;
     if (!status) {
       // Query points lie on the segments from each vertex to the opposite one in the list.
-      start_s = processor_seconds();
+      start_s = bench_seconds();
       for (uint32_t q = 0; q < QUERIES; ++q) {
         sonde_vec3 a = mesh.vertices[q % mesh.vertex_count];
         sonde_vec3 b = mesh.vertices[(q + mesh.vertex_count / 2) % mesh.vertex_count];
@@ -57,14 +47,14 @@ int main(int count, char **arguments) {
                                                            a.y + share * (b.y - a.y),
                                                            a.z + share * (b.z - a.z)});
       }
-      inside_s[k] = (processor_seconds() - start_s) / QUERIES;
+      inside_s[k] = (bench_seconds() - start_s) / QUERIES;
       sonde_surface_index_destroy(index);
     }
     sonde_mesh_clear(&mesh);
     sonde_probe probe;
-    start_s = processor_seconds();
+    start_s = bench_seconds();
     if (status || sonde_probe_create(arguments[1], &probe, &error)) break;
-    probe_s[k] = processor_seconds() - start_s;
+    probe_s[k] = bench_seconds() - start_s;
     sonde_probe_clear(&probe);
   }
   if (error.status) {

@@ -5,11 +5,12 @@
 #include "sonde/limb_model.h"
 #include "sonde/sonde.h"
 
+#include "bench.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 static const double LIFT_M = 2e-3, DEPTH_M = 12e-3, SLIDE_M = 20e-3, FORCE_N = 8, DEEPEST_M = 0.04;
@@ -25,12 +26,6 @@ enum {
   PICTURE_SIZE = 512
 };
 
-static double now(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static double resident_mb(void) {
   long pages = 0, skipped;
   FILE *file = fopen("/proc/self/statm", "r");
@@ -38,11 +33,6 @@ static double resident_mb(void) {
   if (fscanf(file, "%ld %ld", &skipped, &pages) != 2) pages = 0;
   fclose(file);
   return 1e-6 * (double)pages * (double)sysconf(_SC_PAGESIZE);
-}
-
-static int compare(const void *a, const void *b) {
-  const double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
 }
 
 typedef struct leg {
@@ -85,21 +75,21 @@ static sonde_status make(uint64_t seed, const char *path, leg *l, cost *c, sonde
   sonde_limb_body body = sonde_limb_unknown();
   const sonde_limb_model_def def = sonde_limb_model_def_default();
   sonde_model *made = NULL;
-  double start = now();
+  double start = bench_seconds();
   sonde_status status = sonde_limb_draw(&body, seed, &body, error);
   if (!status) status = sonde_limb_model(&body, &def, &made, error);
   if (!status) status = sonde_model_save(made, path, error);
-  c->build_s = now() - start;
+  c->build_s = bench_seconds() - start;
   sonde_model_destroy(made);
   const double before_mb = resident_mb();
-  start = now();
+  start = bench_seconds();
   if (!status) status = sonde_limb_model_load(path, &l->model, error);
-  c->load_s = now() - start;
+  c->load_s = bench_seconds() - start;
   const sonde_world_def world = sonde_session_def_default().world;
   const sonde_echo_def echo = sonde_echo_def_default();
-  start = now();
+  start = bench_seconds();
   if (!status) status = sonde_interior_create(l->model, &l->interior, error);
-  c->inside_s = now() - start;
+  c->inside_s = bench_seconds() - start;
   if (!status) status = sonde_state_create(l->model, &world, &l->state, error);
   if (!status) status = sonde_echo_create(l->interior, &echo, &l->echo, error);
   if (!status) status = sonde_image_create(PICTURE_SIZE, PICTURE_SIZE, &l->image, error);
@@ -117,15 +107,15 @@ static sonde_status press(const leg *l, cost *c, sonde_error *error) {
   sonde_state *state = NULL;
   world.engine = SONDE_ENGINE_DOUBLE; // nothing but equilibria
   def.force_n = FORCE_N;
-  double start = now();
+  double start = bench_seconds();
   sonde_status status = sonde_state_create(l->model, &world, &state, error);
   if (!status)
     status = sonde_settle_path(state, &l->probe, sonde_site_pose(&site, 0),
                                sonde_site_pose(&site, DEEPEST_M), &def, NULL, &path, error);
-  c->press_s = now() - start;
-  start = now();
+  c->press_s = bench_seconds() - start;
+  start = bench_seconds();
   if (!status) update(l, state, path.pose, -1);
-  c->update_s = now() - start;
+  c->update_s = bench_seconds() - start;
   sonde_state_destroy(state);
   return status;
 }
@@ -144,18 +134,18 @@ static void examine(leg *l, cost *c) {
       pose.position.x += along * SLIDE_M * site.v.x;
       pose.position.y += along * SLIDE_M * site.v.y;
       pose.position.z += along * SLIDE_M * site.v.z;
-      double start = now();
+      double start = bench_seconds();
       sonde_step(l->state, &l->probe, pose);
-      c->tick_s[ticks++] = now() - start;
+      c->tick_s[ticks++] = bench_seconds() - start;
       if (k % PICTURE_TICKS != 0) continue;
-      start = now();
+      start = bench_seconds();
       update(l, l->state, pose, 1e-3 * PICTURE_TICKS);
       sonde_echo_render(l->echo, pose, 2 * l->probe.half_x_m, &l->healthy, &settings, &l->image);
-      c->picture_s[pictures++] = now() - start;
+      c->picture_s[pictures++] = bench_seconds() - start;
     }
   }
-  qsort(c->tick_s, ticks, sizeof *c->tick_s, compare);
-  qsort(c->picture_s, pictures, sizeof *c->picture_s, compare);
+  bench_sort(c->tick_s, ticks);
+  bench_sort(c->picture_s, pictures);
 }
 
 static void clear(leg *l) {

@@ -6,24 +6,14 @@
 // synthetic.
 #include "sonde/sonde.h"
 
+#include "bench.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { SIDE = 512, FRAMES = 200, VOXELS = 256, NODES = 33, MOST_REPEATS = 1000 };
-
-static double cpu_ms(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
-}
-
-static int by_size(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
 
 // Grain of about four pixels, the same everywhere.
 static uint8_t grain(uint32_t x, uint32_t y, uint32_t z) {
@@ -59,7 +49,7 @@ typedef struct times {
 } times;
 
 static times sort(double *ms, int repeat, uint64_t reached) {
-  qsort(ms, (size_t)repeat, sizeof *ms, by_size);
+  bench_sort(ms, (size_t)repeat);
   return (times){ms[repeat / 2], ms[(int)(0.99 * (repeat - 1))],
                  (double)reached / ((double)SIDE * SIDE)};
 }
@@ -73,13 +63,13 @@ static times time_sweep(const sonde_sequence *s, const sonde_affine *pose,
   sonde_slicer *slicer;
   o.threads = 1;
   o.method = method;
-  double begin = cpu_ms();
+  double begin = 1e3 * bench_seconds();
   if (sonde_slicer_create(s, &o, &slicer, NULL)) exit(1);
-  *create_ms = cpu_ms() - begin;
+  *create_ms = 1e3 * bench_seconds() - begin;
   for (int k = 0; k < repeat; ++k) {
-    double start = cpu_ms();
+    double start = 1e3 * bench_seconds();
     reached = sonde_slicer_render(slicer, pose, image, NULL);
-    ms[k] = cpu_ms() - start;
+    ms[k] = 1e3 * bench_seconds() - start;
   }
   sonde_slicer_destroy(slicer);
   return sort(ms, repeat, reached);
@@ -105,13 +95,13 @@ static times time_volume(const sonde_volume *v, const sonde_volume_slicer *slice
   double ms[MOST_REPEATS];
   uint64_t reached = 0;
   for (int k = 0; k < repeat; ++k) {
-    double start = cpu_ms();
+    double start = 1e3 * bench_seconds();
     if (slicer)
       reached = sonde_volume_slicer_render(slicer, w, pose, image, NULL);
     else
       reached = w ? sonde_volume_slice_warped(v, w, pose, image, NULL)
                   : sonde_volume_slice(v, false, pose, image, NULL);
-    ms[k] = cpu_ms() - start;
+    ms[k] = 1e3 * bench_seconds() - start;
   }
   return sort(ms, repeat, reached);
 }
@@ -160,9 +150,9 @@ int main(int argc, char **argv) {
                still = plane(0, 0, 0.0201, 0.01, 0, STEP_M);
   sonde_affine pose = plane(3e-3, 4e-3, 9e-3, 0.5, 0.1, 0.09e-3);
   sonde_volume_slicer *bricks;
-  double frames_ms, volume_ms = cpu_ms(), unused;
+  double frames_ms, volume_ms = 1e3 * bench_seconds(), unused;
   if (sonde_volume_slicer_create(&v, &bricks, NULL)) return 1;
-  volume_ms = cpu_ms() - volume_ms;
+  volume_ms = 1e3 * bench_seconds() - volume_ms;
   puts("{");
   print("oblique", time_sweep(&s, &oblique, SONDE_SLICE_BRACKET, repeat, &image, &frames_ms));
   print("along", time_sweep(&s, &along, SONDE_SLICE_BRACKET, repeat, &image, &unused));

@@ -67,7 +67,8 @@ typedef struct sonde_flow_def {
  * branches, the calf's volume, the inflow of its artery. @thread any */
 SONDE_API sonde_flow_def sonde_flow_def_default(const sonde_limb *limb);
 /** The veins of a limb in a position: columns of blood at the middles of the segments, their
- * lengths, the popliteal vein as wide as the knee's bend leaves it.
+ * lengths, the popliteal vein as wide as the knee's bend leaves it. NULL: straight and lying, which
+ * changes nothing.
  * @param[in,out] def as sonde_flow_def_default() of the pose's limb gives it @thread any */
 SONDE_API void sonde_flow_def_hold(const sonde_limb_pose *pose, sonde_flow_def *def);
 

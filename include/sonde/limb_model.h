@@ -51,6 +51,8 @@ SONDE_API const sonde_limb *sonde_limb_of(const sonde_model *model);
 /** The position of such a limb, NULL of a straight one or any other model; the model's.
  *  @thread any */
 SONDE_API const sonde_limb_pose *sonde_limb_pose_of(const sonde_model *model);
+/** That position; SONDE_LIMB_POSITIONS: straight, or no limb. @thread any */
+SONDE_API sonde_limb_position sonde_limb_position_of(const sonde_model *model);
 /** A point of the limb's frame, posed when the limb is, in the model's, or the other way.
  *  @thread any */
 SONDE_API sonde_vec3 sonde_limb_to_model(const sonde_limb *limb, sonde_vec3 point_m);

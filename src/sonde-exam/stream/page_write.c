@@ -24,8 +24,7 @@ static void put_limb(sonde_json_out *out, const sonde_model *model) {
   const sonde_limb *limb = sonde_limb_of(model);
   if (!limb) return;
   const sonde_limb_pose *pose = sonde_limb_pose_of(model);
-  const sonde_limb_position position =
-      pose ? sonde_limb_pose_setting(pose).position : SONDE_LIMB_POSITIONS;
+  const sonde_limb_position position = sonde_limb_position_of(model);
   const double kneecap = 0.97, ankle = 2; // levels
   sonde_pose shin = {{0, 0, 0}, quat_identity()};
   if (pose) shin = sonde_limb_pose_bone(pose, SONDE_LIMB_TIBIA);

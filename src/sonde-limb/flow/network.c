@@ -186,7 +186,8 @@ sonde_flow_def sonde_flow_def_default(const sonde_limb *limb) {
 }
 
 void sonde_flow_def_hold(const sonde_limb_pose *pose, sonde_flow_def *def) {
-  SONDE_ASSERT(pose && def);
+  SONDE_ASSERT(def);
+  if (!pose) return;
   const sonde_limb *limb = pose->limb;
   const double lying_pa = sonde_posture_pressure(SONDE_POSTURE_SUPINE, SONDE_VESSEL_VEIN, 0);
   for (size_t i = 0; i < SONDE_COUNT_OF(BRANCH_OF); ++i) {

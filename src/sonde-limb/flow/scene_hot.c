@@ -70,6 +70,38 @@ static bool blood_at(const piece *p, sonde_vec3 drawn, sonde_vec3 *velocity) {
   return true;
 }
 
+// Lays a piece on the cells whose middles it holds.
+static void lay(const piece *p, sonde_pose probe, const sonde_colour_box *box,
+                sonde_colour_cell *cells) {
+  const sonde_vec3 middle = v_lerp(p->low->centre_m, p->high->centre_m, 0.5);
+  const sonde_vec3 at = pose_apply_inverse(probe, v_add(middle, p->offset));
+  const double reach = fmax(p->low->half_long_m, p->high->half_long_m) + 0.5 * sqrt(p->length2);
+  if (fabs(at.y) > reach) return;
+  const double lean = fabs(tan(box->steer_rad)) * reach + reach;
+  double low[2], high[2];
+  sonde_colour_find(box, at.x - lean, at.z - reach, low);
+  sonde_colour_find(box, at.x + lean, at.z + reach, high);
+  if (high[0] < low[0]) high[0] = low[0];
+  const sonde_vec3 beam =
+      q_rotate(probe.rotation, vec3(sin(box->steer_rad), 0, cos(box->steer_rad)));
+  const int first[2] = {(int)clamp(low[0] - 1, 0, SONDE_COLOUR_LINES),
+                        (int)clamp(low[1] - 1, 0, SONDE_COLOUR_ROWS)};
+  const int last[2] = {(int)clamp(high[0] + 2, 0, SONDE_COLOUR_LINES),
+                       (int)clamp(high[1] + 2, 0, SONDE_COLOUR_ROWS)};
+  for (int row = first[1]; row < last[1]; ++row)
+    for (int line = first[0]; line < last[0]; ++line) {
+      sonde_colour_cell *cell = &cells[row * SONDE_COLOUR_LINES + line];
+      double xz[2];
+      sonde_vec3 velocity;
+      if (cell->vessel != SONDE_COLOUR_NO_VESSEL) continue;
+      sonde_colour_place(box, (uint32_t)line, (uint32_t)row, xz);
+      if (!blood_at(p, pose_apply(probe, vec3(xz[0], 0, xz[1])), &velocity)) continue;
+      const double towards = -v_dot(velocity, beam);
+      *cell = (sonde_colour_cell){
+          (float)towards, (float)sqrt(fmax(v_norm2(velocity) - towards * towards, 0)), p->vessel};
+    }
+}
+
 void sonde_flow_scene_cells(const sonde_flow_scene *s, const sonde_echo *echo,
                             const sonde_colour_box *box, sonde_colour_cell *cells) {
   SONDE_ASSERT(s && echo && box && cells);
@@ -90,34 +122,6 @@ void sonde_flow_scene_cells(const sonde_flow_scene *s, const sonde_echo *echo,
       p.other = v_cross(p.low->axis, p.low->flat_axis);
       const sonde_vec3 drawn = sonde_truth_drawn_at(echo, p.low->centre_m);
       p.offset = q_rotate(probe.rotation, v_sub(drawn, at));
-      // Onto the cells whose middles it holds.
-      const sonde_vec3 middle = v_lerp(p.low->centre_m, p.high->centre_m, 0.5);
-      const sonde_vec3 seen = pose_apply_inverse(probe, v_add(middle, p.offset));
-      const double reach = fmax(p.low->half_long_m, p.high->half_long_m) + 0.5 * sqrt(p.length2);
-      if (fabs(seen.y) > reach) continue;
-      const double lean = fabs(tan(box->steer_rad)) * reach + reach;
-      double low[2], high[2];
-      sonde_colour_find(box, seen.x - lean, seen.z - reach, low);
-      sonde_colour_find(box, seen.x + lean, seen.z + reach, high);
-      if (high[0] < low[0]) high[0] = low[0];
-      const sonde_vec3 beam =
-          q_rotate(probe.rotation, vec3(sin(box->steer_rad), 0, cos(box->steer_rad)));
-      const int first[2] = {(int)clamp(low[0] - 1, 0, SONDE_COLOUR_LINES),
-                            (int)clamp(low[1] - 1, 0, SONDE_COLOUR_ROWS)};
-      const int last[2] = {(int)clamp(high[0] + 2, 0, SONDE_COLOUR_LINES),
-                           (int)clamp(high[1] + 2, 0, SONDE_COLOUR_ROWS)};
-      for (int row = first[1]; row < last[1]; ++row)
-        for (int line = first[0]; line < last[0]; ++line) {
-          sonde_colour_cell *cell = &cells[row * SONDE_COLOUR_LINES + line];
-          double xz[2];
-          sonde_vec3 velocity;
-          if (cell->vessel != SONDE_COLOUR_NO_VESSEL) continue;
-          sonde_colour_place(box, (uint32_t)line, (uint32_t)row, xz);
-          if (!blood_at(&p, pose_apply(probe, vec3(xz[0], 0, xz[1])), &velocity)) continue;
-          const double towards = -v_dot(velocity, beam);
-          *cell = (sonde_colour_cell){(float)towards,
-                                      (float)sqrt(fmax(v_norm2(velocity) - towards * towards, 0)),
-                                      p.vessel};
-        }
+      lay(&p, probe, box, cells);
     }
 }

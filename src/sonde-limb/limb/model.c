@@ -441,6 +441,11 @@ const sonde_limb_pose *sonde_limb_pose_of(const sonde_model *model) {
   return held ? held->pose : NULL;
 }
 
+sonde_limb_position sonde_limb_position_of(const sonde_model *model) {
+  const sonde_limb_pose *pose = sonde_limb_pose_of(model);
+  return pose ? pose->setting.position : SONDE_LIMB_POSITIONS;
+}
+
 sonde_status sonde_limb_model_load(const char *path, sonde_model **out, sonde_error *error) {
   sonde_model *model;
   *out = NULL;
