@@ -53,13 +53,36 @@ static void complain(exam_recovered *found, const char *id, const char *why) {
   snprintf(found->worst, sizeof found->worst, "%.60s: %.170s", id, why);
 }
 
+// Notes of the first part of an exam, which say what it is about, and of the last one, in which it
+// was finished: both the same when there is one part.
+typedef struct exam_ends {
+  sonde_notes first, more; // more: of the last of several parts
+  const sonde_notes *last;
+} exam_ends;
+
+static sonde_status load_ends(const char *directory, exam_ends *ends, sonde_error *error) {
+  char path[EXAM_PATH];
+  *ends = (exam_ends){.last = &ends->first};
+  sonde_status status = sonde_notes_load(exam_part_path(path, directory, 1), &ends->first, error);
+  const uint32_t parts = exam_part_count(directory);
+  if (status || parts < 2) return status;
+  ends->last = &ends->more;
+  (void)sonde_notes_load(exam_part_path(path, directory, parts), &ends->more, NULL);
+  return SONDE_OK;
+}
+
+static void clear_ends(exam_ends *ends) {
+  sonde_notes_clear(&ends->first);
+  sonde_notes_clear(&ends->more);
+}
+
 // What the log should say about one exam.
 static bool read_entry(const char *directory, const char *id, sonde_log_entry *entry,
                        exam_recovered *found) {
   assert(id[0] && directory[0]);
   char path[EXAM_PATH], *text = NULL;
   size_t size = 0;
-  sonde_notes notes = {0};
+  exam_ends notes = {.last = &notes.first};
   sonde_error error = {0};
   sonde_status status = SONDE_OK;
   bool old = exists(directory, "start.json"); // from before the journal
@@ -84,19 +107,13 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
     if (list) closedir(list);
   }
   bool recorded = exists(directory, "exam.rec");
-  if (recorded)
-    status = sonde_notes_load(exam_app_path(path, directory, "exam.rec"), &notes, &error);
-  // An exam was finished in its last part.
-  const uint32_t parts = exam_part_count(directory);
-  sonde_notes last = {0};
-  if (!status && parts > 1)
-    (void)sonde_notes_load(exam_part_path(path, directory, parts), &last, NULL);
-  if (!old && never_began(path, status)) {
+  if (recorded) status = load_ends(directory, &notes, &error);
+  if (!old && never_began(exam_part_path(path, directory, 1), status)) {
     found->never_began++;
     return false;
   }
-  const sonde_note *setup = sonde_notes_last(&notes, SONDE_NOTE_SETUP);
-  const sonde_note *score = sonde_notes_last(parts > 1 ? &last : &notes, SONDE_NOTE_SCORE);
+  const sonde_note *setup = sonde_notes_last(&notes.first, SONDE_NOTE_SETUP);
+  const sonde_note *score = sonde_notes_last(notes.last, SONDE_NOTE_SCORE);
   sonde_json *root = setup ? parse(setup->text) : NULL;
   if (!root && !sonde_file_load(exam_app_path(path, directory, "start.json"), &text, &size, NULL))
     root = parse(text);
@@ -118,8 +135,7 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
   found->interrupted += known && entry->interrupted;
   sonde_free(text);
   sonde_json_free(root);
-  sonde_notes_clear(&notes);
-  sonde_notes_clear(&last);
+  clear_ends(&notes);
   return known;
 }
 
@@ -220,16 +236,15 @@ static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *
                            sonde_error *error) {
   assert(of && log && derived);
   char path[EXAM_PATH];
-  sonde_notes notes, last = {0};
+  exam_ends notes;
   sonde_exam_protocol protocol;
   sonde_log_entry told;
-  sonde_status status =
-      sonde_notes_load(exam_app_path(path, of->directory, "exam.rec"), &notes, error);
-  if (status) return never_began(path, status) ? SONDE_OK : status;
+  sonde_status status = load_ends(of->directory, &notes, error);
+  if (status)
+    return never_began(exam_part_path(path, of->directory, 1), status) ? SONDE_OK : status;
   const uint32_t parts = exam_part_count(of->directory);
-  if (parts > 1) (void)sonde_notes_load(exam_part_path(path, of->directory, parts), &last, NULL);
-  const sonde_note *setup = sonde_notes_last(&notes, SONDE_NOTE_SETUP);
-  const sonde_note *score = sonde_notes_last(parts > 1 ? &last : &notes, SONDE_NOTE_SCORE);
+  const sonde_note *setup = sonde_notes_last(&notes.first, SONDE_NOTE_SETUP);
+  const sonde_note *score = sonde_notes_last(notes.last, SONDE_NOTE_SCORE);
   sonde_json *root = setup && score ? parse(setup->text) : NULL;
   if (root) { // an interrupted exam has no result
     status = fill(of, root, places, &protocol, error);
@@ -242,7 +257,7 @@ static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *
       sonde_frame frame;
       uint32_t held = 0, next = 0;
       if (exam_part_position(of->directory, part, &position)) // else from before positions
-        while (held < of->setups.count && of->setups.held[held].position != position) ++held;
+        held = sonde_exam_setups_find(&of->setups, position);
       if (held == of->setups.count)
         status = app_error(error, SONDE_MISMATCH, "%.300s: %s is no position of the protocol",
                            of->directory, sonde_position_key(position));
@@ -287,8 +302,7 @@ static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *
     *derived = !status;
   }
   sonde_json_free(root);
-  sonde_notes_clear(&notes);
-  sonde_notes_clear(&last);
+  clear_ends(&notes);
   return status;
 }
 

@@ -77,7 +77,7 @@ static sonde_status read_replay(exam_app *app, const char *id, exam_replay *repl
     if (part > 0) to->start_s = to[-1].start_s + to[-1].length_s;
     to->length_s = info.duration_s;
     sonde_exam_setups *all = &replay->setups;
-    while (to->held < all->count && all->held[to->held].position != turned.position) ++to->held;
+    to->held = sonde_exam_setups_find(all, turned.position);
     replay->part_count++;
     if (to->held < all->count) continue;
     if (all->count == SONDE_EXAM_SETUPS)

@@ -121,6 +121,9 @@ SONDE_API sonde_status sonde_exam_prepare(const sonde_case *from,
                                           sonde_exam_setups *setups, sonde_plan *plan,
                                           sonde_error *error);
 SONDE_API void sonde_exam_setups_clear(sonde_exam_setups *setups); /**< @thread owner */
+/** The setup in whose position the patient is; the count when there is none. @thread any */
+SONDE_API uint32_t sonde_exam_setups_find(const sonde_exam_setups *setups,
+                                          sonde_limb_position position);
 
 #ifdef __cplusplus
 }

@@ -245,8 +245,7 @@ sonde_status sonde_exam_prepare(const sonde_case *from, const sonde_exam_protoco
     sonde_case turned = *from;
     if (stop->position < SONDE_LIMB_POSITIONS && sonde_case_takes(from, stop->position))
       turned.position = stop->position;
-    uint32_t held = 0;
-    while (held < setups->count && setups->held[held].position != turned.position) ++held;
+    const uint32_t held = sonde_exam_setups_find(setups, turned.position);
     if (held == SONDE_EXAM_SETUPS)
       status = sonde_fail(error, SONDE_ARGUMENT, "the protocol asks for more than %d positions",
                           SONDE_EXAM_SETUPS);
@@ -265,6 +264,13 @@ sonde_status sonde_exam_prepare(const sonde_case *from, const sonde_exam_protoco
   if (!status) status = sonde_plan_find_targets(plan, setups->held, progress, error);
   if (status) sonde_exam_setups_clear(setups);
   return status;
+}
+
+uint32_t sonde_exam_setups_find(const sonde_exam_setups *setups, sonde_limb_position position) {
+  SONDE_ASSERT(setups && setups->count <= SONDE_EXAM_SETUPS);
+  uint32_t held = 0;
+  while (held < setups->count && setups->held[held].position != position) ++held;
+  return held;
 }
 
 void sonde_exam_setups_clear(sonde_exam_setups *setups) {
