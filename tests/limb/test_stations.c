@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { FAMILY = 20 };
+enum { FAMILY = 50 };
 
 static sonde_limb *member(uint32_t k, sonde_limb_side side) {
   sonde_limb *limb = bare_limb(k, 3000, side);
