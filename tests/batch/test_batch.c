@@ -80,6 +80,18 @@ static void a_force_leaves_the_speed_along_the_face(void **state) {
       v_dot(v_sub(vec3(now[0], now[1], now[2]), start.world_from_probe.position), x);
   assert_near(way_m, 0.02 * 0.4, 0.01 * 0.02 * 0.4);
   sonde_batch_destroy(batch);
+
+  // In the air a probe that may go at 25 mm/s keeps the slope of 20 along the face to 25 down.
+  def.speed_m_s = 0.025;
+  batch = batch_of(&def);
+  assert_int_equal(sonde_batch_reset(batch, 0, &start, NULL), SONDE_OK);
+  step(batch, action);
+  now = sonde_batch_look(batch).pose;
+  const sonde_vec3 way = v_sub(vec3(now[0], now[1], now[2]), start.world_from_probe.position);
+  const sonde_vec3 down = q_rotate(start.world_from_probe.rotation, vec3(0, 0, 1));
+  assert_near(v_dot(way, x) / v_dot(way, down), 0.8, 1e-9);
+  assert_near(v_norm(way), 0.025 * 0.02, 1e-9);
+  sonde_batch_destroy(batch);
 }
 
 static void no_action_goes_far_beyond_the_limit(void **state) {
