@@ -125,12 +125,14 @@ async function replay(page, exam) {
   const { replay: opened } = await state(page);
   check(opened.presses.length === exam.presses.length, "the replay marks the presses");
   const seek = async (share) => {
+    const frames = await page.evaluate(() => window.sonde.frames);
     await page.locator("#scrub").evaluate((e, at) => {
       e.value = String(Number(e.max) * at);
       e.dispatchEvent(new Event("input"));
       e.dispatchEvent(new Event("change"));
     }, share);
     await until(page, (at) => Math.abs(window.sonde.replay.time_s - at * window.sonde.replay.duration_s) < 0.2, share);
+    await until(page, (n) => window.sonde.frames > n, frames);
     await page.waitForTimeout(700);
     return hash(page);
   };

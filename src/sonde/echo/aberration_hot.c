@@ -9,13 +9,13 @@
 
 enum { WAYS = 8 };                    // across an aperture
 static const float least_kept = 0.2f; // of the amplitude
-// Where the lost echo goes: beside its place, as wide as waves from lobes of about 3 mm spread.
+// The lost echo appears beside its place, as wide as fat lobules of about 3 mm scatter it.
 static const float halo_m[HALO_TAPS] = {-1.1e-3f, -0.5e-3f, 0.5e-3f, 1.1e-3f};
 
-// Both ways a point's echo keeps exp(-(k s)^2), s the delays' deviation from a slope across the
-// aperture: a slope turns the beam, which is the rays' part. Delays are in metres at the assumed
-// speed.
-static void find_kept(const sonde_echo *echo, float depth_m, float *kept) {
+// Share of its amplitude that a point's echo keeps at a depth, by line: exp(-(k s)^2) for both
+// ways, s the delays' deviation from a slope across the aperture. The slope itself turns the beam,
+// which the traced rays do. Delays are in metres at the assumed speed.
+static void find_kept_amplitude(const sonde_echo *echo, float depth_m, float *kept) {
   SONDE_ASSERT(echo->padded <= SONDE_MOST_LINES && depth_m >= 0);
   const sonde_sound *s = echo->sound;
   const frame *f = &echo->frame;
@@ -23,7 +23,8 @@ static void find_kept(const sonde_echo *echo, float depth_m, float *kept) {
   const float row_m = (float)(f->reach_m / (SOUND_ROWS - 1)), per_m = (float)(1 / f->pitch_m);
   const float curve = f->radius_m > 0 ? (float)(1 / f->radius_m) : 0;
   const float k = (float)(2 * SONDE_PI / f->wavelength_m);
-  // Of all ways: delays, delays times u, squares of delays; u is the way's place in the aperture.
+  // Sums over the ways of the delay, of the delay times u and of the delay squared; u is the place
+  // of the way in the aperture, -1 to 1.
   float delay[SONDE_MOST_LINES], sum[3][SONDE_MOST_LINES] = {{0}}, u_square = 0;
   for (int way = 0; way < WAYS; ++way) {
     const float u = 2 * ((float)way + 0.5f) / WAYS - 1;
@@ -52,7 +53,7 @@ static void find_kept(const sonde_echo *echo, float depth_m, float *kept) {
 
 void sonde_aberration_find(sonde_echo *echo) {
   sonde_sound *s = echo->sound;
-  // Beside the outer lines these go on.
+  // Lines beside the picture have the slowness of its outer ones.
   for (uint32_t row = 0; row < SOUND_ROWS; ++row) {
     float *slow = s->trace_slow[row] + SOUND_MARGIN;
     for (int k = 1; k <= SOUND_MARGIN; ++k) slow[-k] = slow[0];
@@ -63,7 +64,7 @@ void sonde_aberration_find(sonde_echo *echo) {
   SONDE_ASSERT(columns <= KEPT_COLUMNS && first + echo->lines <= columns);
   for (uint32_t depth = 0; depth <= KEPT_DEPTHS; ++depth) {
     float *kept = s->kept[depth];
-    find_kept(echo, (float)(f->depth_m * depth / KEPT_DEPTHS), kept + first);
+    find_kept_amplitude(echo, (float)(f->depth_m * depth / KEPT_DEPTHS), kept + first);
     for (uint32_t l = 0; l < first; ++l) kept[l] = kept[first];
     for (uint32_t l = first + echo->lines; l < columns; ++l) kept[l] = kept[l - 1];
   }

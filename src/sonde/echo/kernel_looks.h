@@ -21,7 +21,7 @@ typedef struct haze_taps {
   float re[HAZE_TAPS], im[HAZE_TAPS];
 } haze_taps;
 
-// What aberration sends into a column from beside it, where it takes from its own.
+// Columns whose echo aberration sends into a column, in place of what the column's own loses.
 enum { HALO_TAPS = 4 };
 typedef struct halo_taps {
   int32_t offset[HALO_TAPS]; // lines
