@@ -27,7 +27,8 @@ class Package(unittest.TestCase):
         said = json.loads(subprocess.run(
             [os.environ["SONDE_PROGRAM"], "press", sonde.data_file("thigh.sonde"), "--site", "27",
              "--force-n", "3", "--json"], check=True, capture_output=True, text=True).stdout)
-        self.assertAlmostEqual(found["force_n"], said["force_n"], places=6)
+        # Each press settles to a residual of 1e-6 of its force, from poses that differ in rounding.
+        self.assertAlmostEqual(found["force_n"], said["force_n"], delta=3e-6)
         self.assertAlmostEqual(found["depth_m"] * 1e3, said["penetration_mm"], places=5)
         self.assertAlmostEqual(found["vessels"]["femoral_vein"]["area_ratio"],
                                said["vein_area_ratio"], delta=0.02)  # breath and pulse
