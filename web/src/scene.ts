@@ -15,7 +15,11 @@ import { TargetMark } from "./target";
 import { PART, type Frame, type LimbInfo, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
 
 const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
-const LOW_INTERVAL_S = 1 / 8; // between two pictures of the leg with low quality
+// Between two pictures of the leg with low quality: while skin or probe move, and while only the echo image changes.
+const LOW_INTERVAL_S = 1 / 8;
+const LOW_STILL_INTERVAL_S = 1;
+const STILL_MM = 0.05; // movements below this one are not seen
+const STILL_COSINE = Math.cos(0.0005); // of half the angle that the probe turned by
 const FOV_DEG = 27;
 const WIDE = 1.3; // width over height in which the whole leg is seen
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
@@ -73,6 +77,14 @@ function splitEnds(mesh: Mesh): { skin: number[]; ends: number[] } {
   return { skin, ends };
 }
 
+/** Whether skin or probe have visibly moved between two frames of one patient. */
+function hasMoved(before: Frame, now: Frame): boolean {
+  const [a, b] = [before.snapshot, now.snapshot];
+  if (a.probe !== b.probe || Math.hypot(...a.position_mm.map((v, i) => v - b.position_mm[i]!)) > STILL_MM) return true;
+  if (Math.abs(a.rotation.reduce((sum, v, i) => sum + v * b.rotation[i]!, 0)) < STILL_COSINE) return true;
+  return now.displacements.some((d, i) => Math.abs(d * now.quantum_mm - before.displacements[i]! * before.quantum_mm) > STILL_MM);
+}
+
 interface SiteDot {
   node: number;
   rest: THREE.Vector3;
@@ -110,11 +122,13 @@ export class LegScene {
   private range_mm = 10;
   private through = true;
   private dirty = true;
+  private imaged = false; // a new echo image came since the last picture
   private drawn_s = -Infinity;
   private flat: FlatView | null = null; // draws while there is no WebGL
   private readonly vessels = new Map<number, FlatVessel>();
   private sites: readonly Site[] = [];
   private frame: Frame | null = null;
+  private placed: Frame | null = null; // that skin and probe were last drawn at
   private seen = ""; // side and position of the leg
   private faced = "";
   private away_mm = 560;
@@ -256,6 +270,7 @@ export class LegScene {
     else if (part.part === PART.skin) this.setSkin(part);
     else if (part.part === PART.femur) this.setFemur(part);
     else this.setProbeBody(part);
+    this.placed = null; // the new part has to be put where the newest frame has it
     this.dirty = true;
   }
 
@@ -272,7 +287,7 @@ export class LegScene {
     this.restMesh = new THREE.Mesh(LegScene.geometry(mesh));
     for (const part of this.vessels.keys()) this.inside.getObjectByName(`vessel ${part}`)?.removeFromParent();
     this.vessels.clear();
-    this.frame = null;
+    this.frame = this.placed = null;
     this.look(mesh);
     const g = LegScene.geometry(mesh);
     const colours = new Float32Array((mesh.points.length / 3) * 4).fill(CALM_ALPHA);
@@ -362,7 +377,7 @@ export class LegScene {
     this.dots.renderOrder = 4;
     this.dotInfo = sites.map((site) => ({ node: this.nearestNode(site.position_mm), rest: new THREE.Vector3(...site.position_mm) }));
     this.scene.add(this.dots);
-    this.moveDots(null);
+    this.moveDots(this.placed);
   }
 
   /** The measured sites mean something in free practice only. */
@@ -438,14 +453,22 @@ export class LegScene {
 
   show(frame: Frame): void {
     if (frame.displacements.length !== this.skin?.points.length) return; // of the patient before this one
+    this.dirty ||= !this.frame || !this.placed || hasMoved(this.placed, frame);
+    this.imaged ||= this.through;
     this.frame = frame;
-    this.deform(frame);
-    this.moveDots(frame);
-    this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
-    this.placeImage(frame);
     const probe = this.probes[frame.snapshot.probe];
     if (this.gelled && probe && this.skin && this.gel.spread(this.skin.points, frame.snapshot, probe)) this.wetSkin();
-    this.dirty = true;
+  }
+
+  /** Puts skin, marks, probe and image where the newest frame has them. */
+  private place(frame: Frame): void {
+    if (!this.placed || hasMoved(this.placed, frame)) {
+      this.placed = frame;
+      this.deform(frame);
+      this.moveDots(frame);
+      this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
+    }
+    this.placeImage(frame);
   }
 
   private deform(frame: Frame): void {
@@ -593,17 +616,19 @@ export class LegScene {
     if (!drawn) this.dirty = true;
   }
 
-  /** Draws the leg if it has changed; with low quality at most 8 times a second, so that image and force have
-   *  the processor where it also does a graphics card's work. */
+  /** Draws the leg if it has changed; with low quality at most 8 times a second, and once a second while nothing
+   *  moves, so that image and force have the processor where it also does a graphics card's work. */
   render(now_s: number): void {
-    if (!this.dirty || (this.low && now_s - this.drawn_s < LOW_INTERVAL_S)) return;
-    this.dirty = false;
+    if (!this.dirty && !this.imaged) return;
+    if (this.low && now_s - this.drawn_s < (this.dirty ? LOW_INTERVAL_S : LOW_STILL_INTERVAL_S)) return;
+    this.dirty = this.imaged = false;
     this.drawn_s = now_s;
     if (!this.renderer && !this.isFlat) {
       this.renderer = this.makeRenderer();
       if (!this.renderer) this.setFlat(true);
       this.resize();
     }
+    if (this.frame) this.place(this.frame);
     this.sides.face(this.camera);
     if (this.isFlat) this.drawFlat(this.flat!);
     else this.renderer?.render(this.scene, this.camera);
