@@ -89,9 +89,11 @@ SONDE_API sonde_status sonde_plan_make(const sonde_exam_protocol *protocol,
                                        sonde_error *error);
 
 /** Finds the force of every place by pressing a healthy vein there: thigh and posture of the
- * place's setup, its oedema, the linear probe straight above the vein at 12 mm/s, the inside by
- * finite elements as in a session; no clot, breath or strain. Places of one station share the force
- * that closes the veins of all of them. About 2 s of a core's time for each place in a limb.
+ * place's setup, its oedema, the linear probe straight above the vein at 12 mm/s (faster while the
+ * vein is wide open), the inside by finite elements as in a session; no clot, breath or strain.
+ * Places of one station share the force that closes the veins of all of them. About 1.8 s of a
+ * core's time for each place in a limb, on all cores but one; the forces do not depend on their
+ * number.
  *  @param setup [as many as the places name] of the case, with whose maps the plan was made
  *  @return MISMATCH for a place where the healthy vein does not close at 60 N, or 60 mm deep;
  *    CANCELLED; MEMORY @thread owner */

@@ -28,6 +28,12 @@ void sonde_bench_close(sonde_bench *bench) {
   sonde_probe_clear(&bench->probe);
 }
 
+void sonde_bench_rest(sonde_bench *bench) {
+  sonde_state_reset(bench->state);
+  bench->tick = bench->looked_tick = 0;
+  bench->looked = false;
+}
+
 void sonde_bench_step(sonde_bench *bench, sonde_pose probe) {
   sonde_step(bench->state, &bench->probe, probe);
   bench->tick++;

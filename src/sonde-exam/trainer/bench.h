@@ -24,6 +24,8 @@ sonde_status sonde_bench_open(sonde_bench *bench, const sonde_case_setup *setup,
                               const sonde_findings *findings, bool solid, sonde_error *error);
 // Also after a failed open.
 void sonde_bench_close(sonde_bench *bench);
+// The tissue back at rest, tick 0.
+void sonde_bench_rest(sonde_bench *bench);
 // One step of the world with the probe there.
 void sonde_bench_step(sonde_bench *bench, sonde_pose probe);
 // What a session's snapshot holds; vessels only under a probe that presses.
