@@ -2,6 +2,7 @@
 #include "base/random.h"
 #include "echo/bench.h"
 #include "echo/echo.h"
+#include "echo/live.h"
 
 #include <string.h>
 
@@ -174,6 +175,36 @@ static void live_picture_of_still_tissue_is_the_still(void **state) {
   look(&b, NULL);
   assert_memory_equal(b.image.pixels, still, pixels);
   sonde_free(still);
+  bench_clear(&b);
+}
+
+// Begun anew, a live picture shows nothing of those before: it is the first one of a new renderer.
+static void a_live_picture_begun_anew_forgets(void **state) {
+  (void)state;
+  static bench b;
+  bench_create(&b, 0.08, 0.01, 4e-3, false, true);
+  sonde_scanner s = full_scanner();
+  s.haze_db = -30, s.filter = 0.5, s.persistence = 0.5;
+  set_scanner(&b, &s, false, true);
+  look(&b, NULL);
+  const size_t pixels = (size_t)b.image.width * b.image.height;
+  uint8_t *first = SONDE_NEW(uint8_t, pixels);
+  memcpy(first, b.image.pixels, pixels);
+  const sonde_pose here = b.pose;
+  for (int k = 0; k < 4; ++k) {
+    b.pose.position = v_madd(here.position, 4e-3 * (k + 1), vec3(k % 2, -0.5, 1));
+    look(&b, NULL);
+    b.pose = here;
+    sonde_echo_begin_looks(b.echo);
+    look(&b, NULL);
+    uint32_t differ = 0, most = 0;
+    for (size_t i = 0; i < pixels; ++i) {
+      const uint32_t off = (uint32_t)abs(b.image.pixels[i] - first[i]);
+      differ += off > 0, most = off > most ? off : most;
+    }
+    if (differ) fail_msg("%u of %zu pixels differ, by %u at most", differ, pixels, most);
+  }
+  sonde_free(first);
   bench_clear(&b);
 }
 
@@ -477,6 +508,7 @@ int main(void) {
       cmocka_unit_test(looks_average_speckle_as_their_overlap_says),
       cmocka_unit_test(looks_leave_lumina_as_wide),
       cmocka_unit_test(live_picture_of_still_tissue_is_the_still),
+      cmocka_unit_test(a_live_picture_begun_anew_forgets),
       cmocka_unit_test(kernels_agree_on_a_full_scanner),
       cmocka_unit_test(aberration_moves_power),
       cmocka_unit_test(sliders_and_ceiling_shape_the_compensation),

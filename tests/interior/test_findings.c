@@ -4,6 +4,7 @@
 #include "interior/tube.h"
 
 #include <stdio.h>
+#include <string.h>
 
 static const double leg = 0.08, middle_m = 0.15;
 
@@ -45,8 +46,9 @@ static void destroy(limb *l) {
   tube_clear(&l->tube);
 }
 
-// Even load below a 60 x 12 mm face and a dent that goes with it; equilibrium.
-static void press(limb *l, double force_n, double dent_m) {
+// Even load below a 60 x 12 mm face and a dent that goes with it, so long after the last update;
+// dt_s < 0: equilibrium.
+static void press_for(limb *l, double force_n, double dent_m, double dt_s) {
   const sonde_mesh *skin = &l->tube.model.surface;
   sonde_pose pose = tube_pose(leg, middle_m);
   sonde_vec3 *moved = SONDE_NEW(sonde_vec3, skin->vertex_count);
@@ -62,10 +64,12 @@ static void press(limb *l, double force_n, double dent_m) {
       l->load[i] = under && force_n > 0 ? vec3(0, -force_n / touched, 0) : vec3(0, 0, 0);
       moved[i] = v_madd(skin->vertices[i], -dent_m * w, vec3(0, 1, 0));
     }
-  sonde_interior_update(l->in, &(sonde_interior_input){moved, l->load, pose, &healthy, -1, 1, 0.03,
-                                                       0.006, 0, SONDE_POSTURE_SUPINE});
+  sonde_interior_update(l->in, &(sonde_interior_input){moved, l->load, pose, &healthy, dt_s, 1,
+                                                       0.03, 0.006, 0, SONDE_POSTURE_SUPINE});
   sonde_free(moved);
 }
+
+static void press(limb *l, double force_n, double dent_m) { press_for(l, force_n, dent_m, -1); }
 
 static sonde_vessel_state cut(const limb *l, int which) {
   sonde_vessel_state v;
@@ -269,6 +273,36 @@ static void vessels_alone_have_the_same_areas(void **state) {
   destroy(&l);
 }
 
+// Every vessel goes on to the bit from where it was remembered, wherever it was since then.
+static void memory_holds_every_vessel(void **state) {
+  (void)state;
+  enum { ALL = 2 * SONDE_SECTIONS };
+  static limb l;
+  static sonde_interior_memory memory;
+  static sonde_vessel_state after[SONDE_VESSELS][ALL];
+  create(&l);
+  press(&l, 9, 6e-3);
+  sonde_interior_remember(l.in, &memory);
+  press_for(&l, 2, 2e-3, 0.03);
+  for (uint32_t which = 0; which < l.in->vessel_count; ++which) {
+    assert_true(l.in->course[which].count > 0 && l.in->course[which].count <= ALL);
+    memcpy(after[which], l.in->state[which], l.in->course[which].count * sizeof after[0][0]);
+  }
+  press(&l, 0, 0);
+  assert_int_equal(sonde_interior_recall(l.in, &memory, NULL), SONDE_OK);
+  press_for(&l, 2, 2e-3, 0.03);
+  for (uint32_t which = 0; which < l.in->vessel_count; ++which)
+    for (uint32_t i = 0; i < l.in->course[which].count; ++i) {
+      const sonde_vessel_state *a = &after[which][i], *b = &l.in->state[which][i];
+      if (a->area_ratio != b->area_ratio || v_distance(a->flat_axis, b->flat_axis) > 0)
+        fail_msg("vessel %u, section %u: area %.17g, was %.17g", which, i, b->area_ratio,
+                 a->area_ratio);
+    }
+  memory.area_ratio[SONDE_MEMORY_SECTIONS - 1] = (double)NAN;
+  assert_int_equal(sonde_interior_recall(l.in, &memory, NULL), SONDE_FORMAT);
+  destroy(&l);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(branches_are_vessels),
@@ -277,6 +311,7 @@ int main(void) {
       cmocka_unit_test(each_wall_is_exact),
       cmocka_unit_test(lesions_lie_in_the_tissue),
       cmocka_unit_test(vessels_alone_have_the_same_areas),
+      cmocka_unit_test(memory_holds_every_vessel),
       cmocka_unit_test(nonsense_is_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

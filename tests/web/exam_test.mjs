@@ -133,8 +133,14 @@ async function replay(page, exam) {
     }, share);
     await until(page, (at) => Math.abs(window.sonde.replay.time_s - at * window.sonde.replay.duration_s) < 0.2, share);
     await until(page, (n) => window.sonde.frames > n, frames);
-    await page.waitForTimeout(700);
-    return hash(page);
+    // Another part of the exam has another model, which takes seconds: the image has come when it stays.
+    for (let [last, same] = [-1, 0]; ; ) {
+      const now = await hash(page);
+      same = now === last ? same + 1 : 0;
+      if (same === 4) return now;
+      last = now;
+      await page.waitForTimeout(500);
+    }
   };
   const there = await seek(0.5);
   const elsewhere = await seek(0.2);

@@ -118,10 +118,10 @@ void sonde_interior_remember(const sonde_interior *in, sonde_interior_memory *me
   memory->building = in->building, memory->built = in->built;
   if (in->live->ready) store_footprint(&in->live->grid.footprint, memory->live);
   if (in->building) store_footprint(&in->next->grid.footprint, memory->next);
-  for (int which = 0; which < 2; ++which)
-    for (uint32_t i = 0; i < in->course[which].count; ++i) {
-      memory->area_ratio[which][i] = in->state[which][i].area_ratio;
-      memory->flat_axis[which][i] = in->state[which][i].flat_axis;
+  for (uint32_t which = 0, at = 0; which < in->vessel_count; ++which)
+    for (uint32_t i = 0; i < in->course[which].count; ++i, ++at) {
+      memory->area_ratio[at] = in->state[which][i].area_ratio;
+      memory->flat_axis[at] = in->state[which][i].flat_axis;
     }
 }
 
@@ -134,9 +134,8 @@ sonde_status sonde_interior_recall(sonde_interior *in, const sonde_interior_memo
     bool extent = k < 2 || (m->live[k] >= 0 && m->live[k] < 1 && m->next[k] >= 0 && m->next[k] < 1);
     usable = usable && extent && fabs(m->live[k]) < 1e3 && fabs(m->next[k]) < 1e3;
   }
-  for (int which = 0; which < 2; ++which)
-    for (uint32_t i = 0; i < SONDE_SECTIONS; ++i)
-      usable = usable && fabs(m->area_ratio[which][i]) < 1e6 && v_finite(m->flat_axis[which][i]);
+  for (uint32_t i = 0; i < SONDE_MEMORY_SECTIONS; ++i)
+    usable = usable && fabs(m->area_ratio[i]) < 1e6 && v_finite(m->flat_axis[i]);
   if (!usable) return sonde_fail(error, SONDE_FORMAT, "not a state of the inside that was saved");
   in->building = false;
   const sonde_footprint footprint = footprint_of(m->live);
@@ -152,10 +151,10 @@ sonde_status sonde_interior_recall(sonde_interior *in, const sonde_interior_memo
   if (m->building) sonde_interior_next_window(in, m->next);
   in->building = m->building, in->built = m->built;
   in->ready = m->ready, in->tick = m->tick, in->solid = false;
-  for (int which = 0; which < 2; ++which)
-    for (uint32_t i = 0; i < in->course[which].count; ++i) {
-      in->state[which][i].area_ratio = m->area_ratio[which][i];
-      in->state[which][i].flat_axis = m->flat_axis[which][i];
+  for (uint32_t which = 0, at = 0; which < in->vessel_count; ++which)
+    for (uint32_t i = 0; i < in->course[which].count; ++i, ++at) {
+      in->state[which][i].area_ratio = m->area_ratio[at];
+      in->state[which][i].flat_axis = m->flat_axis[at];
     }
   return SONDE_OK;
 }

@@ -15,6 +15,7 @@
 #include "sonde/tissue_anatomy.h"
 
 enum { SONDE_SECTIONS = 160, SONDE_VESSELS = 2 + SONDE_BRANCHES };
+enum { SONDE_MEMORY_SECTIONS = 3072 }; // of all vessels of a leg, at most
 
 // Constant facts of one column of the table.
 typedef struct sonde_column {
@@ -182,8 +183,9 @@ typedef struct sonde_interior_memory {
   uint64_t tick;
   uint32_t ready, live_ready, building, built;
   double live[4], next[4]; // footprints: angle, position, half extents
-  double area_ratio[2][SONDE_SECTIONS];
-  sonde_vec3 flat_axis[2][SONDE_SECTIONS];
+  // Of all vessels, one after the other.
+  double area_ratio[SONDE_MEMORY_SECTIONS];
+  sonde_vec3 flat_axis[SONDE_MEMORY_SECTIONS];
 } sonde_interior_memory;
 
 // The next update's share of a window that is being built, so that the update is quicker; nothing

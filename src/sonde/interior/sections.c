@@ -162,12 +162,18 @@ sonde_status sonde_sections_create(sonde_interior *in, sonde_error *error) {
   const sonde_thigh_anatomy *anatomy = in->model->anatomy;
   const struct sonde_tissue_map *map = in->model->map;
   sonde_status status = lay_out(in, &in->model->vein, &in->model->artery, error);
+  uint32_t all = in->course[0].count + in->course[1].count;
   for (uint32_t b = 0; anatomy != NULL && b < anatomy->branch_count && !status; ++b) {
     const uint32_t which = in->vessel_count++;
     SONDE_ASSERT(which < SONDE_VESSELS);
     in->course[which].kind = anatomy->branch[b].kind;
     status = resample(in, which, &anatomy->branch[b].line, error);
     if (status != SONDE_OK) return status;
+    all += in->course[which].count;
+    if (all > SONDE_MEMORY_SECTIONS)
+      return sonde_fail(error, SONDE_ARGUMENT,
+                        "the leg's vessels have more than %d sections of %g mm",
+                        SONDE_MEMORY_SECTIONS, 1e3 * spacing_m);
     rest_state(in, which);
     for (uint32_t i = 0; i < in->course[which].count; ++i) {
       sonde_vessel_section *section = &in->section[which][i];
