@@ -4,6 +4,8 @@
 #include "app.h"
 #include "pose.h"
 
+#include "sonde/trainer.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdio.h>
@@ -63,14 +65,14 @@ sonde_status settled_place(const settled *s, const char *model, long number, con
     return app_error(error, SONDE_NOT_FOUND,
                      "%.400s names no stations: give --site K, one of its %u sites", model,
                      s->model->site_count);
-  const sonde_landmark *found = station ? NULL : &a->landmark[0];
-  uint32_t meant = 0;
+  uint32_t found = station ? count : 0, meant = 0;
   for (uint32_t k = 0; station && k < count; ++k) {
     if (!begins(a->landmark[k].name, station)) continue;
-    if (meant++ == 0 || strlen(a->landmark[k].name) == strlen(station)) found = &a->landmark[k];
+    if (meant++ == 0 || strlen(a->landmark[k].name) == strlen(station)) found = k;
   }
-  if (meant > 1 && strlen(found->name) != strlen(station)) found = NULL; // several begin so
-  const sonde_site *site = found ? sonde_model_site(s->model, found->site) : NULL;
+  if (meant > 1 && strlen(a->landmark[found].name) != strlen(station)) found = count; // several
+  const sonde_landmark *mark = found < count ? &a->landmark[found] : NULL;
+  const sonde_site *site = mark ? sonde_model_site(s->model, mark->site) : NULL;
   if (!site) {
     char list[400] = "";
     for (uint32_t k = 0; k < count; ++k) {
@@ -78,13 +80,19 @@ sonde_status settled_place(const settled *s, const char *model, long number, con
       snprintf(list + used, sizeof list - used, "%s%s", k ? ", " : "", a->landmark[k].name);
     }
     return app_error(error, SONDE_NOT_FOUND, "no station '%.60s', expected one of %s",
-                     station ? station : found->name, list);
+                     station ? station : mark->name, list);
   }
-  // As at the nearest site, but over the vein itself; the pose makes the axes square.
-  sonde_site here = *site;
-  here.position_m = found->skin_m, here.normal = found->normal;
-  *above = sonde_site_pose(&here, 0);
-  snprintf(at, 64, "%s", found->name);
+  snprintf(at, 64, "%s", mark->name);
+  sonde_vein_map map;
+  sonde_status status = sonde_vein_map_make(s->model, &map, error);
+  if (status) return status;
+  if (found < map.station_count) { // of a limb: as its view is taken, in an exam too
+    *above = map.station[found].probe;
+  } else { // as at the nearest site, but over the vein itself; the pose makes the axes square
+    sonde_site here = *site;
+    here.position_m = mark->skin_m, here.normal = mark->normal;
+    *above = sonde_site_pose(&here, 0);
+  }
   return SONDE_OK;
 }
 
