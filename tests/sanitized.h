@@ -1,6 +1,11 @@
 // Under a sanitizer the loops that only repeat run fewer times: the first rounds reach the code.
+// ./test --long sets SONDE_TEST_LONG: then each test takes all the samples that it is made for.
 #ifndef SONDE_TESTS_SANITIZED_H
 #define SONDE_TESTS_SANITIZED_H
+
+#include <stdlib.h>
+
+#define SAMPLES(all, usual) (getenv("SONDE_TEST_LONG") ? (all) : (usual))
 
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)

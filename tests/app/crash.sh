@@ -114,7 +114,7 @@ calls_of() { cat "$work/count"; }
 over() {
   local calls=$1 hows=$2 every=1 k how
   shift 2
-  [[ $mode != quick ]] || every=$((calls * $(wc -w <<<"$hows") / 4 + 1))
+  [[ $mode != quick ]] || every=$((calls * $(wc -w <<<"$hows") / 3 + 1))
   [[ ! $mode =~ ^[0-9]+$ ]] || every=$mode
   local n=0
   for ((k = 0; k < calls; ++k)); do

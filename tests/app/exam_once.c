@@ -86,6 +86,10 @@ static int examine(exam_app *app) {
   ask_noted(app, &(sonde_page_request){.ask = SONDE_PAGE_HINT});
   ask(app, &(sonde_page_request){.ask = SONDE_PAGE_POSITION, .id = "prone_bent"});
   turn_for(app, seconds / 2);
+  if (!app->exam) { // the second part could not be begun: the exam is over, the first part is kept
+    fprintf(stderr, "exam_once: the page is told: %s\n", app->message);
+    return APP_FAILED;
+  }
   decide(app, "compressible");
   exam_finish(app, &error);
   if (is_kept(app)) say("kept");

@@ -1,5 +1,6 @@
 // A probe that is led through the body turns no skin inside out: it is taken off, the flag says so,
 // and the skin is at rest when the probe has left the body. What presses and slides is left alone.
+#include "../sanitized.h"
 #include "exam_test.h"
 
 enum { RADIUS_MM = 70 };
@@ -83,7 +84,7 @@ static void straight_through_leaves_the_skin_as_it_was(void **state) {
   assert_non_null(mkdtemp(directory));
   snprintf(path, sizeof path, "%s/through.rec", directory);
   def.record_path = path;
-  for (int k = 0; k < 3; ++k) {
+  for (int k = SAMPLES(0, 2); k < 3; ++k) {
     double angle = SONDE_PI * (2 + k) / 4; // a chord, a wider one, right through
     const sonde_script_key keys[] = {{0.0, on_barrel(0, -0.1, -0.01)},
                                      {0.2, on_barrel(0, -0.1, 0.01)},

@@ -1,5 +1,6 @@
 // The journal of an exam under a disk that fails and a program that dies: at every single call that
 // changes the disk. What was acknowledged is never lost.
+#include "../sanitized.h"
 #include "exam_test.h"
 
 #include "base/disk.h"
@@ -152,7 +153,7 @@ static int count_calls(const sonde_model *model) {
 static void killed_at_every_call_nothing_is_lost(void **state) {
   int calls = count_calls(*state);
   assert_true(calls >= 20);
-  for (int k = 0; k < calls; ++k) {
+  for (int k = 0; k < calls; k += k + 3 < calls ? SAMPLES(1, 3) : 1) {
     clean();
     *shared = (told){0};
     fflush(NULL);
@@ -179,7 +180,7 @@ static void full_disk_loses_nothing_that_was_told(void **state) {
   int calls = count_calls(*state), refused = 0;
   struct stat right, got;
   assert_int_equal(stat(path, &right), 0);
-  for (int k = 0; k < 2 * calls; ++k) {
+  for (int k = 0; k < 2 * calls; k += SAMPLES(1, 3)) {
     clean();
     *shared = (told){0};
     bool once = k % 2;

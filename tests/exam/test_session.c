@@ -1,5 +1,6 @@
 // Sessions in lockstep: one state behind force, skin and image; the same inputs, the same state;
 // faults fade the force.
+#include "../sanitized.h"
 #include "exam_test.h"
 
 static int set_up(void **state) {
@@ -366,7 +367,7 @@ static void creation_survives_lack_of_memory(void **state) {
   sonde_set_allocator(&(sonde_allocator){counting, releasing, NULL});
   sonde_status status = SONDE_MEMORY;
   size_t n = 1;
-  for (; status && n < 100000; n += 1 + n / 8) {
+  for (; status && n < 100000; n += 1 + n / ROUNDS(8, 2)) {
     sonde_session *session = NULL;
     alive = 0;
     sonde_device device = press_device();

@@ -3,6 +3,7 @@
 #define SONDE_TESTS_IDENTIFY_H
 
 #include "../fixture.h"
+#include "../sanitized.h"
 #include "base/random.h"
 #include "sonde/identify.h"
 

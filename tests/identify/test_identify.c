@@ -46,7 +46,7 @@ static void damping_comes_back(void **unused) {
 static void friction_comes_back(void **unused) {
   (void)unused;
   const sonde_friction truth[2] = {{0.3, 0.2, 0.03, 0, 0.05}, {0.15, 0.15, 0.01, 0, 0.05}};
-  for (int k = 0; k < 2; ++k) {
+  for (int k = SAMPLES(0, 1); k < 2; ++k) {
     sonde_model *model = fixture_model(3, NULL);
     sonde_world_def def = sonde_identify_world();
     def.friction = truth[k];
@@ -108,7 +108,7 @@ static void one_simulation_tells_its_share(void **unused) {
   p.depth_m = 2e-3;
   p.speed_m_s[0] = 0.08;
   p.speed_count = 1;
-  p.hold_s = 60; // far longer than a report takes
+  p.hold_s = 10; // far longer than a report takes
   p.rate_hz = 100;
   sonde_motion_record record = make(model, NULL, p, 1);
   sonde_damping_result found;

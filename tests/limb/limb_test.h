@@ -3,6 +3,7 @@
 #define SONDE_TESTS_LIMB_TEST_H
 
 #include "../fixture.h"
+#include "../sanitized.h"
 #include "sonde/limb.h"
 
 #ifndef DEGREE

@@ -6,9 +6,10 @@
 #include "limb/pose.h"
 #include "limb/vessels_graph.h"
 
-enum { FAMILY = 4 };
-static sonde_limb *family[FAMILY];
-static sonde_limb_pose *posed[FAMILY][SONDE_LIMB_POSITIONS];
+enum { MOST = 4 };
+#define FAMILY (uint32_t) SAMPLES(MOST, 2)
+static sonde_limb *family[MOST];
+static sonde_limb_pose *posed[MOST][SONDE_LIMB_POSITIONS];
 
 static sonde_limb_pose *put(const sonde_limb *limb, sonde_limb_setting setting) {
   sonde_limb_pose *pose = NULL;

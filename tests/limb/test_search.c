@@ -314,9 +314,9 @@ static void every_station_is_found(void **state) {
   assert_int_equal(missed, 0);
 }
 
-// test_limb_search [LEGS]: of how many legs, 6 unless told. Row 87's count is 20.
-int main(int argc, char **argv) {
-  uint32_t legs = argc > 1 ? (uint32_t)strtoul(argv[1], NULL, 10) : 6;
+// Row 87 counts 20 legs.
+int main(void) {
+  uint32_t legs = SAMPLES(20, 3);
   const struct CMUnitTest tests[] = {cmocka_unit_test_prestate(every_station_is_found, &legs)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,9 +4,10 @@
 
 #include "limb/bones.h"
 
-enum { FAMILY = 24, WHOLE = 6 };
-static sonde_limb *family[FAMILY]; // right limbs, bones and surfaces alone
-static sonde_limb *whole[WHOLE];   // the first of them with vessels and muscles
+enum { MOST = 24, WHOLE = 6 };
+#define FAMILY (uint32_t) SAMPLES(MOST, 12)
+static sonde_limb *family[MOST]; // right limbs, bones and surfaces alone
+static sonde_limb *whole[WHOLE]; // the first of them with vessels and muscles
 
 static int make_family(void **state) {
   (void)state;

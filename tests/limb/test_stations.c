@@ -1,5 +1,6 @@
 // Stations of limbs over seeds, sexes and body mass indices: probes that see their vein, the views'
 // order of depth, bands of force, protocols.
+#include "../sanitized.h"
 #include "bare_limb.h"
 
 #include "../../bench/limb_laws.h"
@@ -7,7 +8,8 @@
 
 #include <string.h>
 
-enum { FAMILY = 50 };
+enum { MOST = 50 };
+#define FAMILY (uint32_t) SAMPLES(MOST, 16)
 
 static sonde_limb *member(uint32_t k, sonde_limb_side side) {
   sonde_limb *limb = bare_limb(k, 3000, side);
@@ -15,8 +17,8 @@ static sonde_limb *member(uint32_t k, sonde_limb_side side) {
   return limb;
 }
 
-static sonde_limb *family[FAMILY];
-static sonde_limb_station stations[FAMILY][SONDE_LIMB_STATIONS];
+static sonde_limb *family[MOST];
+static sonde_limb_station stations[MOST][SONDE_LIMB_STATIONS];
 
 static int make_family(void **state) {
   (void)state;

@@ -58,7 +58,9 @@ class Tasks(unittest.TestCase):
 
     def test_the_learner_beats_chance(self):
         import learn_reach
-        rows, random, scripted = learn_reach.main(pictures=(0, 120), episodes=8, count=4)
+        rows, random, scripted = learn_reach.main(
+            **dict(pictures=(0, 120), episodes=8) if os.environ.get("SONDE_TEST_LONG")
+            else dict(pictures=(0, 60), episodes=4), count=4)
         self.assertGreater(rows[1][1], rows[0][1])
         self.assertGreaterEqual(scripted, rows[1][1])
 

@@ -1,5 +1,6 @@
 // Sheets: bending against a strip that is clamped at one end, gradients against differences, and
 // what falls on a thin sheet.
+#include "../sanitized.h"
 #include "scene_fixture.h"
 
 #include <stdlib.h>
@@ -46,13 +47,14 @@ static void test_cantilever(void **unused) {
       "loads: [{box_mm: [[42, -10, -1], [43, 10, 1]], force_n: [0, 0, %g]}]}\ncontacts: none\n",
       B, FORCE);
   world w = world_of(text);
-  steps(&w, 2000);
+  const int rounds = ROUNDS(2000, 100); // it needs them all to come to rest
+  steps(&w, rounds);
   double tip = 0;
   const sonde_vec3 *x = sonde_scene_nodes(w.state, 0);
   for (uint32_t i = 0; i < sonde_scene_body(w.scene, 0).node_count; ++i) tip = fmax(tip, x[i].z);
   double wanted = FORCE * LENGTH * LENGTH * LENGTH / (3 * B * WIDTH);
   print_message("cantilever: sinks by %.4g mm of %.4g\n", tip * 1e3, wanted * 1e3);
-  assert_near(tip / wanted, 1, 0.03);
+  assert_near(tip / wanted, 1, rounds == 2000 ? 0.03 : 1);
   world_end(&w);
 }
 
@@ -71,7 +73,7 @@ static void test_drapes(void **unused) {
       "springs: {stiffness_n_m: 150, damping_n_s_m: 0.1, thickness_mm: 1, bending_n_m: 1e-4, "
       "bending_damping_s: 0.01}, mass_kg: 0.01, position_mm: [0, 0, 60]}\n");
   double before = INFINITY, gained = 0;
-  for (int k = 0; k < 600; ++k) {
+  for (int k = 0; k < ROUNDS(600, 60); ++k) {
     steps(&w, 1);
     double now = total_energy(&w);
     if (k) gained = fmax(gained, now - before);
@@ -81,7 +83,7 @@ static void test_drapes(void **unused) {
   print_message("sheet on a ball: at %.1f mm, largest gain of energy in a step %.2g J of %.2g\n",
                 m.centre_m.z * 1e3, gained, 0.01 * 9.81 * 0.06);
   assert_true(gained < 1e-5);
-  assert_true(m.centre_m.z > 0.005 && m.centre_m.z < 0.045);
+  assert_true(m.centre_m.z > 0.005 && m.centre_m.z < ROUNDS(0.045, 0.061));
   assert_unflagged(&w);
   world_end(&w);
 }

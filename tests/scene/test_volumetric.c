@@ -131,6 +131,9 @@ static void test_ball(void **unused) {
     char path[] = "/tmp/sonde_model_XXXXXX", text[1024];
     sonde_model_kind kind = KINDS[k / 2];
     bool conserves = k % 2;
+    // The two laws that are farthest apart come to rest in every test, all of them in a long one.
+    if (!conserves && !SAMPLES(true, kind == SONDE_LATTICE || kind == SONDE_NEO_HOOKEAN_SOLID))
+      continue;
     save_block(kind, path);
     snprintf(text, sizeof text,
              "%sgravity_m_s2: [0, 0, -9.81]\nstep: {dt_s: %s, newton: %d, sleep_mm: 0}\nbodies:\n"
@@ -141,7 +144,7 @@ static void test_ball(void **unused) {
     world w = world_of(text);
     unlink(path);
     double before = total_energy(&w), gained = 0, first = before, weight = 0.04 * 9.81;
-    int rounds = conserves ? ROUNDS(160, 20) : ROUNDS(400, 20);
+    int rounds = conserves ? ROUNDS(SAMPLES(160, 40), 20) : ROUNDS(400, 20);
     for (int step = 0; step < rounds; ++step) {
       steps(&w, 1);
       double now = total_energy(&w);

@@ -3,7 +3,7 @@ import { spawn } from "node:child_process";
 import { findAddress } from "./drive.mjs";
 
 /** For tests that watch what happens, not how often: a page and its program share the processor. */
-export const FEW_IMAGES = ["--images-hz", "10"];
+export const FEW_IMAGES = ["--images-hz", "4"];
 
 /**
  * `sonde run` with these arguments, once it has printed the learner's and the teacher's address:

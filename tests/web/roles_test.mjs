@@ -109,10 +109,9 @@ async function main() {
   const browser = await openBrowser(chromium);
   const errors = [];
   const learner = await visit(browser, running.learner, errors);
-  const watcher = await visit(browser, running.learner, errors);
-  const teacher = await visit(browser, running.teacher, errors);
   await learner.locator("#trainee").fill("Test learner");
   await learner.locator("#start-go").click();
+  const [watcher, teacher] = await Promise.all([visit(browser, running.learner, errors), visit(browser, running.teacher, errors)]);
   await learner.waitForFunction(() => window.sonde.exam?.phase === "running" && window.sonde.exam.elapsed_s > 0);
   await testReload(learner, watcher);
   await testTeacher(learner, teacher);

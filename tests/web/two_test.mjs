@@ -90,8 +90,7 @@ async function press(page, depth) {
 
 /** Ada presses twice and decides; Bo presses once; neither sees anything of the other. */
 async function apart(ada, bo, places) {
-  await begin(ada, /^Full/, 0);
-  await begin(bo, /^None/, 3);
+  await Promise.all([begin(ada, /^Full/, 0), begin(bo, /^None/, 3)]);
   const [first, second] = [await exam(ada), await exam(bo)];
   check(first.exam !== second.exam && first.case !== second.case, "two learners, two exams, two cases");
   await goTo(ada);
