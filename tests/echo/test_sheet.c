@@ -112,7 +112,7 @@ static double spectrum(const sonde_echo *echo, double energy[BINS + 1]) {
     cosine[i] = cos(SONDE_PI * i / BINS), sine[i] = sin(SONDE_PI * i / BINS);
   for (int l = 0; l < count; ++l) hann[l] = pow(sin(SONDE_PI * (l + 0.5) / count), 2);
   for (int k = 0; k <= BINS; ++k) energy[k] = 0;
-  for (uint32_t n = 0; n < echo->samples; ++n)
+  for (uint32_t n = 0; n < echo->samples; n += SAMPLES(1, 3))
     for (int k = -BINS; k <= BINS; ++k) {
       double re = 0, im = 0;
       for (int l = 0; l < count; ++l) {

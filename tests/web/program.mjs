@@ -1,6 +1,18 @@
 // Starts the program for tests, pictures and benchmarks of the page.
 import { spawn } from "node:child_process";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { findAddress } from "./drive.mjs";
+
+/** For tests of who may do what: a protocol of one place, which is prepared in seconds, in a new directory. */
+export function onePlace() {
+  const directory = mkdtempSync(join(tmpdir(), "sonde-protocols-"));
+  process.on("exit", () => rmSync(directory, { recursive: true }));
+  const place = "{title: Groin, at: {station: common_femoral}, position: supine_turned}";
+  writeFileSync(join(directory, "groin.yaml"), `sonde_protocol: 1\nid: groin\ntitle: Groin\ntext: Groin alone.\nplaces:\n- ${place}\n`);
+  return ["--protocols", directory];
+}
 
 /** For tests that watch what happens, not how often: a page and its program share the processor. */
 export const FEW_IMAGES = ["--images-hz", "4"];

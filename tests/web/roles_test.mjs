@@ -7,7 +7,7 @@ import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { addressOf, browserPath, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
-import { FEW_IMAGES, startRun } from "./program.mjs";
+import { FEW_IMAGES, onePlace, startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -105,7 +105,7 @@ async function testComments(learner, watcher) {
 }
 
 async function main() {
-  const running = await startRun(sonde, ["--port", "0", "--exams", exams, ...FEW_IMAGES]);
+  const running = await startRun(sonde, ["--port", "0", "--exams", exams, ...onePlace(), ...FEW_IMAGES]);
   const browser = await openBrowser(chromium);
   const errors = [];
   const learner = await visit(browser, running.learner, errors);

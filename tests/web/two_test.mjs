@@ -10,7 +10,7 @@ import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
-import { FEW_IMAGES } from "./program.mjs";
+import { FEW_IMAGES, onePlace } from "./program.mjs";
 import { Client } from "./socket.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -46,7 +46,7 @@ const status = async (at) => (await fetch(`${at.origin}status.json`, { headers: 
 
 /** Both programs, once they answer. */
 async function startClass(port) {
-  const child = spawn(sonde, ["class", "--names", "Ada,Bo", "--port", String(port), "--", "--exams", exams, ...FEW_IMAGES], { stdio: ["ignore", "pipe", "inherit"] });
+  const child = spawn(sonde, ["class", "--names", "Ada,Bo", "--port", String(port), "--", "--exams", exams, ...onePlace(), ...FEW_IMAGES], { stdio: ["ignore", "pipe", "inherit"] });
   let said = "";
   child.stdout.on("data", (text) => (said += text));
   const places = [];
