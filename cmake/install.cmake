@@ -47,3 +47,15 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/thigh ${PROJECT_SOURCE_DIR}/data/sc
 if(TARGET thigh)
   install(FILES ${SONDE_BUNDLED_MODEL} DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde)
 endif()
+
+# All that `cmake --install` copies, for builds that leave tests, benchmarks and samples out.
+add_custom_target(installed)
+foreach(library IN LISTS SONDE_LIBRARIES)
+  string(REPLACE "-" "_" target ${library})
+  add_dependencies(installed ${target}_lib_static ${target}_lib_shared)
+endforeach()
+foreach(target IN ITEMS sonde manual thigh python)
+  if(TARGET ${target})
+    add_dependencies(installed ${target})
+  endif()
+endforeach()

@@ -36,6 +36,14 @@ cc "$source_dir/../../samples/step_loop.c" -o step $(pkg-config --cflags sonde) 
 readelf -d step | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p' >needed
 if grep -vE '^lib(m|z|c)\.so|^ld-linux' needed; then echo "the step needs more than libm, libz, libc"; exit 1; fi
 
+echo "-- headers as C11, C17 and C++17"
+(cd "$prefix/include" && find sonde -name '*.h' | sort | sed 's/.*/#include <&>/') >all.h
+for language in 'c c11' 'c c17' 'c++ c++17'; do
+  # shellcheck disable=SC2086 # language and standard are two words
+  set -- $language
+  "${CC:-cc}" -x "$1" -std="$2" -Wall -Wextra -Wpedantic -Werror -I"$prefix/include" -fsyntax-only all.h
+done
+
 echo "-- find_package"
 cmake -S "$source_dir" -B cm -G Ninja -DCMAKE_PREFIX_PATH="$prefix" >cm.log 2>&1 || { cat cm.log; exit 1; }
 cmake --build cm >cm.log 2>&1 || { cat cm.log; exit 1; }
