@@ -129,12 +129,11 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
 
 sonde_status exam_turn(exam_app *app, const char *position, sonde_error *error) {
   exam *of = app->exam;
-  uint32_t held = 0;
+  sonde_limb_position wanted;
   if (app->phase != EXAM_RUNNING || !of)
     return app_error(error, SONDE_ARGUMENT, "there is no exam in which the patient could turn");
-  while (held < of->setups.count &&
-         strcmp(sonde_position_key(of->setups.held[held].position), position) != 0)
-    ++held;
+  const bool known = sonde_position_parse(position, &wanted);
+  const uint32_t held = known ? sonde_exam_setups_find(&of->setups, wanted) : of->setups.count;
   if (held == of->setups.count)
     return app_error(error, SONDE_NOT_FOUND, "no place of this exam is in that position");
   if (held == of->held) return SONDE_OK;

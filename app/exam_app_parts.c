@@ -5,7 +5,6 @@
 
 #include <assert.h>
 #include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 const char *exam_part_path(char path[EXAM_PATH], const char *directory, uint32_t part) {
@@ -27,12 +26,7 @@ bool exam_part_position(const char *directory, uint32_t part, sonde_limb_positio
   char path[EXAM_PATH];
   sonde_json *setup = exam_read_setup(exam_part_path(path, directory, part));
   const char *key = sonde_json_as_text(sonde_json_member(setup, "position"));
-  uint32_t k = 0;
-  while (key && k <= SONDE_LIMB_POSITIONS &&
-         strcmp(key, sonde_position_key((sonde_limb_position)k)) != 0)
-    ++k;
-  const bool known = key && k <= SONDE_LIMB_POSITIONS;
-  if (known) *position = (sonde_limb_position)k;
+  const bool known = sonde_position_parse(key, position);
   sonde_json_free(setup);
   return known;
 }

@@ -226,6 +226,8 @@ SONDE_API void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_
 SONDE_API bool sonde_case_takes(const sonde_case *of, sonde_limb_position position);
 /** Key of a position in files, e.g. "prone_bent"; SONDE_LIMB_POSITIONS: "straight". @thread any */
 SONDE_API const char *sonde_position_key(sonde_limb_position position);
+/** The position of a key; false, and nothing written, for another text or NULL. @thread any */
+SONDE_API bool sonde_position_parse(const char *key, sonde_limb_position *position);
 /** What the patient does in a position, e.g. "prone, the knee bent". @thread any */
 SONDE_API const char *sonde_position_title(sonde_limb_position position);
 

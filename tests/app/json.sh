@@ -22,7 +22,7 @@ gives "$press force_n>=11.98 force_n<=12.02 contact_n>=11.98 contact_n<=12.02 ar
   vein_area_ratio<=0.1" \
   press "$MODEL" --site 27 --probe linear --force-n 12 --case healthy --image a.png --json
 [[ $(head -c 4 a.png 2>/dev/null | tail -c 3) == PNG ]] || wrong "sonde press wrote no PNG"
-gives "$press vein_area_ratio>=0.7" press "$MODEL" --site 27 --probe linear --depth-mm 8 \
+gives "$press vein_area_ratio>=0.7" press "$MODEL" --site 27 --probe linear --force-n 12 \
   --case chronic --json
 # Every force is met, also where the skin has two equilibria at a depth.
 gives "$press force_n>=12.98 force_n<=13.02" press "$MODEL" --site 27 --force-n 13 --json

@@ -122,6 +122,7 @@ export class LegScene {
   private range_mm = 10;
   private through = true;
   private dirty = true;
+  private moved = false; // skin or probe, since the last picture
   private imaged = false; // a new echo image came since the last picture
   private drawn_s = -Infinity;
   private flat: FlatView | null = null; // draws while there is no WebGL
@@ -270,7 +271,7 @@ export class LegScene {
     else if (part.part === PART.skin) this.setSkin(part);
     else if (part.part === PART.femur) this.setFemur(part);
     else this.setProbeBody(part);
-    this.placed = null; // the new part has to be put where the newest frame has it
+    this.moved = true; // the new part has to be put where the newest frame has it
     this.dirty = true;
   }
 
@@ -364,6 +365,7 @@ export class LegScene {
       mark.position.set(-info.half_x_mm, 0, -Math.min(10, 4 * info.half_y_mm));
       this.probeBodies.get(i)?.add(mark);
     });
+    this.dirty = true;
   }
 
   setSites(sites: readonly Site[]): void {
@@ -378,6 +380,7 @@ export class LegScene {
     this.dotInfo = sites.map((site) => ({ node: this.nearestNode(site.position_mm), rest: new THREE.Vector3(...site.position_mm) }));
     this.scene.add(this.dots);
     this.moveDots(this.placed);
+    this.dirty = true;
   }
 
   /** The measured sites mean something in free practice only. */
@@ -453,22 +456,19 @@ export class LegScene {
 
   show(frame: Frame): void {
     if (frame.displacements.length !== this.skin?.points.length) return; // of the patient before this one
-    this.dirty ||= !this.frame || !this.placed || hasMoved(this.placed, frame);
-    this.imaged ||= this.through;
+    this.moved ||= !this.placed || hasMoved(this.placed, frame);
+    this.imaged ||= this.through && !this.isFlat; // the plain view shows no echo image
     this.frame = frame;
     const probe = this.probes[frame.snapshot.probe];
     if (this.gelled && probe && this.skin && this.gel.spread(this.skin.points, frame.snapshot, probe)) this.wetSkin();
   }
 
-  /** Puts skin, marks, probe and image where the newest frame has them. */
+  /** Puts skin, marks and probe where a frame has them. */
   private place(frame: Frame): void {
-    if (!this.placed || hasMoved(this.placed, frame)) {
-      this.placed = frame;
-      this.deform(frame);
-      this.moveDots(frame);
-      this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
-    }
-    this.placeImage(frame);
+    this.placed = frame;
+    this.deform(frame);
+    this.moveDots(frame);
+    this.placeProbe(frame.snapshot.probe, frame.snapshot.position_mm, frame.snapshot.rotation);
   }
 
   private deform(frame: Frame): void {
@@ -619,16 +619,18 @@ export class LegScene {
   /** Draws the leg if it has changed; with low quality at most 8 times a second, and once a second while nothing
    *  moves, so that image and force have the processor where it also does a graphics card's work. */
   render(now_s: number): void {
-    if (!this.dirty && !this.imaged) return;
-    if (this.low && now_s - this.drawn_s < (this.dirty ? LOW_INTERVAL_S : LOW_STILL_INTERVAL_S)) return;
-    this.dirty = this.imaged = false;
+    const changed = this.dirty || this.moved;
+    if (!changed && !this.imaged) return;
+    if (this.low && now_s - this.drawn_s < (changed ? LOW_INTERVAL_S : LOW_STILL_INTERVAL_S)) return;
+    if (this.frame && this.moved) this.place(this.frame);
+    if (this.frame && this.imaged) this.placeImage(this.frame);
+    this.dirty = this.moved = this.imaged = false;
     this.drawn_s = now_s;
     if (!this.renderer && !this.isFlat) {
       this.renderer = this.makeRenderer();
       if (!this.renderer) this.setFlat(true);
       this.resize();
     }
-    if (this.frame) this.place(this.frame);
     this.sides.face(this.camera);
     if (this.isFlat) this.drawFlat(this.flat!);
     else this.renderer?.render(this.scene, this.camera);

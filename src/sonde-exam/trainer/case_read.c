@@ -30,6 +30,15 @@ const char *sonde_position_key(sonde_limb_position position) {
   return sonde_case_positions[position];
 }
 
+bool sonde_position_parse(const char *key, sonde_limb_position *position) {
+  for (int k = 0; key && k <= SONDE_LIMB_POSITIONS; ++k)
+    if (strcmp(sonde_case_positions[k], key) == 0) {
+      *position = (sonde_limb_position)k;
+      return true;
+    }
+  return false;
+}
+
 const char *sonde_position_title(sonde_limb_position position) {
   SONDE_ASSERT((unsigned)position <= SONDE_LIMB_POSITIONS);
   return POSITION_TITLES[position];

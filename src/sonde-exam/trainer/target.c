@@ -3,13 +3,13 @@
 #include "base/parallel.h"
 #include "trainer/bench.h"
 
-// The probe starts above the skin, looked at every 25 ms. While the vein is wide open it comes down
-// fast; from then on it presses as a careful hand does, and the tissue has lost the fast way's
-// viscous force before the vein closes (docs/trainer_theory.md).
+// The probe starts above the skin, and the vein is looked at every 25 ms. While the vein is wide
+// open the probe comes down fast; from then on it presses as a careful hand does, and the tissue
+// loses the viscous force of the fast way before the vein closes (docs/trainer_theory.md).
 static const double LIFT_M = 0.002, FAST_M_S = 0.048, SPEED_M_S = 0.012;
 static const double WIDE_RATIO = 0.85, DEEPEST_M = 0.060, FORCE_MOST_N = 60;
-enum { TICKS_PER_LOOK = 25 };
-enum { STANDS_PER_BENCH = 6 };
+// A bench takes 1 s to open: several places share it.
+enum { TICKS_PER_LOOK = 25, PLACES_PER_BENCH = 6 };
 static const double ROOM = 1.2, ROOM_N = 2; // from the target to the limit
 
 sonde_force_target sonde_force_target_make(double closes_n) {
@@ -29,16 +29,19 @@ uint32_t sonde_plan_nearest(const sonde_plan *plan, uint32_t held, sonde_vec3 fa
   return nearest;
 }
 
-// Places where the probe stands, of one setup: a bench presses one after the other.
+// Places of one setup that a bench presses one after the other.
 typedef struct bench_work {
   uint32_t held, count;
-  uint32_t place[STANDS_PER_BENCH];
+  uint32_t place[PLACES_PER_BENCH];
 } bench_work;
 
 typedef struct target_work {
   sonde_plan *plan;
   const sonde_case_setup *setup; // [by bench_work.held] of the case
   bench_work bench[SONDE_PLAN_POINTS];
+  uint32_t pressed_most; // places that are pressed in all
+  atomic_uint pressed;
+  const sonde_progress *progress; // the caller's
 } target_work;
 
 // Presses healthy veins from above the skin: at a station those of all its places. @return the
@@ -75,8 +78,8 @@ static double find_closing_force(sonde_bench *bench, const sonde_plan *plan,
   return (double)NAN;
 }
 
-// The places of one bench.
-static sonde_status find_targets(void *user, uint32_t worker, uint32_t item,
+// Presses the places of one bench.
+static sonde_status press_places(void *user, uint32_t worker, uint32_t item,
                                  const atomic_bool *stop, sonde_error *error) {
   (void)worker;
   target_work *work = user;
@@ -100,41 +103,47 @@ static sonde_status find_targets(void *user, uint32_t worker, uint32_t item,
                      "at %.0f N; compression decides nothing there",
                      point->title, 1e3 * point->at.depth_m, FORCE_MOST_N);
     if (!status) point->target = sonde_force_target_make(closes_n);
+    atomic_fetch_add(&work->pressed, 1);
   }
   sonde_bench_close(&bench);
   return status;
 }
 
+// Tells the caller the share of the places, not that of the benches.
+static bool report_places(double fraction, const char *what, void *user) {
+  (void)fraction;
+  target_work *work = user;
+  const double pressed = atomic_load(&work->pressed);
+  return sonde_progress_report(work->progress, pressed / work->pressed_most, what);
+}
+
 sonde_status sonde_plan_find_targets(sonde_plan *plan, const sonde_case_setup *setup,
                                      const sonde_progress *progress, sonde_error *error) {
   SONDE_ASSERT(plan && setup && setup->model);
-  target_work work = {.plan = plan, .setup = setup};
+  target_work work = {.plan = plan, .setup = setup, .progress = progress};
 
-  // Where the probe stands, each place once, by setup; how they are shared among benches does not
-  // depend on the number of threads.
-  uint32_t stand[SONDE_PLAN_POINTS], benches = 0, setups = 0;
+  // Each place where the probe stands is pressed once. The plan alone decides which places share a
+  // bench, so that the forces do not depend on the number of threads.
+  bench_work *open[SONDE_EXAM_SETUPS] = {NULL}; // of each setup, the bench that has room
+  uint32_t stand[SONDE_PLAN_POINTS], benches = 0;
   for (uint32_t i = 0; i < plan->count; ++i) {
+    const sonde_plan_point *point = &plan->point[i];
+    SONDE_ASSERT(point->held < SONDE_EXAM_SETUPS);
     stand[i] = 0;
-    while (!(stand[i] == i || sonde_same_stand(&plan->point[stand[i]], &plan->point[i])))
-      ++stand[i];
-    setups = plan->point[i].held >= setups ? plan->point[i].held + 1 : setups;
-  }
-  for (uint32_t held = 0; held < setups; ++held) {
-    bench_work *bench = NULL;
-    for (uint32_t i = 0; i < plan->count; ++i) {
-      if (plan->point[i].held != held || stand[i] != i) continue;
-      if (!bench || bench->count == STANDS_PER_BENCH) {
-        bench = &work.bench[benches++];
-        bench->held = held;
-      }
-      bench->place[bench->count++] = i;
-    }
+    while (stand[i] < i && !sonde_same_stand(&plan->point[stand[i]], point)) ++stand[i];
+    if (stand[i] < i) continue;
+    bench_work **bench = &open[point->held];
+    if (!*bench || (*bench)->count == PLACES_PER_BENCH) *bench = &work.bench[benches++];
+    (*bench)->held = point->held;
+    (*bench)->place[(*bench)->count++] = i;
+    ++work.pressed_most;
   }
 
-  // One core is left to who feels and sees something meanwhile.
+  // One core is left to the session that goes on meanwhile.
   const uint32_t cores = sonde_parallel_workers(0, benches + 1);
-  sonde_status status = sonde_parallel_run(benches, cores > 1 ? cores - 1 : 1, find_targets, &work,
-                                           progress, "force of every place", error);
+  const sonde_progress report = {report_places, &work};
+  sonde_status status = sonde_parallel_run(benches, cores > 1 ? cores - 1 : 1, press_places, &work,
+                                           &report, "force of every place", error);
   for (uint32_t i = 0; i < plan->count && !status; ++i)
     plan->point[i].target = plan->point[stand[i]].target;
   return status;
