@@ -13,6 +13,7 @@ typedef struct limb {
   sonde_thigh_anatomy anatomy;
   sonde_interior *in;
   sonde_vec3 *load;
+  double at_m; // of the probe along the leg
 } limb;
 
 static void add_branch(limb *l, const char *name, sonde_vessel_kind kind, double depth, double x,
@@ -29,7 +30,7 @@ enum { SAPHENOUS = 2, SECOND, DEEP_ARTERY };
 // Vein and artery 18 mm deep, a saphenous vein in the fat above them, a second vein beside the
 // first.
 static void create(limb *l) {
-  *l = (limb){.tube = tube_create(leg, 0.014, 0.3, 0.012, 160, 80)};
+  *l = (limb){.tube = tube_create(leg, 0.014, 0.3, 0.012, 160, 80), .at_m = middle_m};
   add_branch(l, "great_saphenous", SONDE_VESSEL_VEIN, 7e-3, 4e-3, 1.8e-3);
   add_branch(l, "second_femoral_vein", SONDE_VESSEL_VEIN, 18e-3, 11e-3, 4e-3);
   add_branch(l, "deep_femoral_artery", SONDE_VESSEL_ARTERY, 32e-3, 0, 2.5e-3);
@@ -50,7 +51,7 @@ static void destroy(limb *l) {
 // dt_s < 0: equilibrium.
 static void press_for(limb *l, double force_n, double dent_m, double dt_s) {
   const sonde_mesh *skin = &l->tube.model.surface;
-  sonde_pose pose = tube_pose(leg, middle_m);
+  sonde_pose pose = tube_pose(leg, l->at_m);
   sonde_vec3 *moved = SONDE_NEW(sonde_vec3, skin->vertex_count);
   sonde_pathology healthy;
   uint32_t touched = 0;
@@ -303,6 +304,49 @@ static void memory_holds_every_vessel(void **state) {
   destroy(&l);
 }
 
+// In equilibrium the vessels are those of the place, wherever the probe was before and whatever
+// window was being built.
+static void equilibrium_forgets_where_the_probe_was(void **state) {
+  (void)state;
+  static limb fresh, used;
+  create(&fresh), create(&used);
+  sonde_interior_set_method(fresh.in, SONDE_INTERIOR_SOLID);
+  sonde_interior_set_method(used.in, SONDE_INTERIOR_SOLID);
+  press(&used, 6, 6e-3);
+  used.at_m += 5e-3;
+  for (int k = 0; k < 3; ++k) press_for(&used, 6, 6e-3, 0.02);
+  assert_true(used.in->building);
+  fresh.at_m = used.at_m = middle_m + 6e-3;
+  press(&fresh, 6, 6e-3), press(&used, 6, 6e-3);
+  assert_true(fresh.in->solid && used.in->solid);
+  for (uint32_t which = 0; which < fresh.in->vessel_count; ++which)
+    for (uint32_t i = 0; i < fresh.in->course[which].count; ++i)
+      assert_true(fresh.in->state[which][i].outside_pa == used.in->state[which][i].outside_pa);
+  destroy(&fresh), destroy(&used);
+}
+
+// A probe at 60 mm/s outruns the windows of a session; one whose updates wait stays with the solid.
+static void who_waits_keeps_the_solid(void **state) {
+  (void)state;
+  static limb l;
+  create(&l);
+  sonde_interior_set_method(l.in, SONDE_INTERIOR_SOLID);
+  for (int waits = 0; waits < 2; ++waits) {
+    int lost = 0;
+    sonde_interior_wait(l.in, waits);
+    l.at_m = middle_m;
+    press(&l, 6, 6e-3);
+    for (int k = 0; k < 15; ++k) {
+      l.at_m += 1e-3;
+      press_for(&l, 6, 6e-3, 1 / 60.0);
+      lost += !l.in->solid;
+    }
+    print_message("waits %d: %d of 15 updates without the solid\n", waits, lost);
+    assert_true((lost == 0) == waits);
+  }
+  destroy(&l);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(branches_are_vessels),
@@ -312,6 +356,8 @@ int main(void) {
       cmocka_unit_test(lesions_lie_in_the_tissue),
       cmocka_unit_test(vessels_alone_have_the_same_areas),
       cmocka_unit_test(memory_holds_every_vessel),
+      cmocka_unit_test(equilibrium_forgets_where_the_probe_was),
+      cmocka_unit_test(who_waits_keeps_the_solid),
       cmocka_unit_test(nonsense_is_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

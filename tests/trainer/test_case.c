@@ -88,6 +88,27 @@ static void a_leg_has_its_position(void **state) {
     assert_near(v_distance(setup.map.station[k].probe.position, skin), 0, 1e-6);
   }
   sonde_case_setup_clear(&setup);
+  // The great saphenous vein is pressed below its arch, where it runs across the plane.
+  c.position = SONDE_LIMB_SUPINE_TURNED;
+  if (sonde_case_build(&c, NULL, NULL, &setup, &error)) fail_msg("%s", error.message);
+  const uint32_t saphenous = sonde_vein_segment(&setup.map, "great_saphenous");
+  const sonde_thigh_anatomy *anatomy = setup.model->anatomy;
+  uint32_t branch = 0, junction = 0, at = 0;
+  while (strcmp(anatomy->branch[branch].name, "great_saphenous") != 0) ++branch;
+  while (strcmp(setup.map.station[junction].name, "saphenofemoral_junction") != 0) ++junction;
+  const sonde_vessel *line = &anatomy->branch[branch].line;
+  const sonde_map_station *station_of = &setup.map.station[junction];
+  for (uint32_t i = 1; i + 1 < line->count; ++i)
+    if (v_distance(line->point[i].centre_m, station_of->vein_m[saphenous]) <
+        v_distance(line->point[at].centre_m, station_of->vein_m[saphenous]))
+      at = i;
+  assert_true(at > 0 && at + 1 < line->count);
+  const sonde_vec3 course =
+      v_unit(v_sub(line->point[at + 1].centre_m, line->point[at - 1].centre_m), vec3(0, 0, 1));
+  const double along = v_dot(course, q_rotate(station_of->probe.rotation, vec3(0, 0, 1)));
+  print_message("saphenous vein at the junction: cosine to the beam %.2f\n", along);
+  assert_true(fabs(along) < 0.5);
+  sonde_case_setup_clear(&setup);
   snprintf(text, sizeof text, LEG, "circulation: {posture: sitting}\n");
   assert_int_equal(sonde_case_parse(text, "bent.yaml", &c, &error), SONDE_MISMATCH);
   assert_non_null(strstr(error.message, "no posture"));

@@ -129,6 +129,12 @@ static void forces_follow_the_patient(void **state) {
     if (sonde_plan_make(&protocol, &setup.map, &plan[k], &error)) fail_msg("%s", error.message);
     assert_true(isnan(plan[k].point[0].target.firm_n));
     if (sonde_plan_find_targets(&plan[k], &setup, NULL, &error)) fail_msg("%s", error.message);
+    // A place has its force whether or not others share the bench before it.
+    sonde_plan alone = plan[k];
+    alone.point[0] = alone.point[1], alone.count = 1;
+    if (k == LYING && sonde_plan_find_targets(&alone, &setup, NULL, &error))
+      fail_msg("%s", error.message);
+    if (k == LYING) assert_true(alone.point[0].target.closes_n == plan[k].point[1].target.closes_n);
     sonde_case_setup_clear(&setup);
   }
   for (int i = 0; i < 2; ++i) {

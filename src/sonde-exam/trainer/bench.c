@@ -19,6 +19,7 @@ sonde_status sonde_bench_open(sonde_bench *bench, const sonde_case_setup *setup,
   if (!status) status = sonde_interior_set_findings(bench->interior, findings, error);
   if (!status && !solid) sonde_interior_set_method(bench->interior, SONDE_INTERIOR_COLUMNS);
   if (!status) sonde_interior_for_vessels(bench->interior, true);
+  if (!status) sonde_interior_wait(bench->interior, true);
   return status;
 }
 

@@ -12,6 +12,7 @@ static const double FACE_HALF_M = 0.025; // half of the picture's width: veins f
                                          // in it
 enum { SLIDES = 6, STEADY = 2 };
 static const double SLIDE_M = 0.002;
+static const double MOST_ALONG_BEAM = 0.5; // cosine between a vein and the beam
 
 static const struct {
   const char *name, *title;
@@ -187,7 +188,9 @@ static void find_stations(const sonde_model *model, const sonde_limb *limb, sond
     if (to->segment == SONDE_SEGMENTS && isfinite(main_m.z))
       to->segment = sonde_vein_segment_at(map, main_m.z);
     // A vein that begins or ends beside the station is looked for within a finger's breadth, where
-    // it stays in the plane when the tissue moves a little under the press.
+    // it stays in the plane when the tissue moves a little under the press, and where it runs
+    // across the plane: along the beam, as in the arch of a saphenous vein, a press hardly closes
+    // it.
     for (uint32_t i = 0; i < map->segment_count; ++i) {
       const sonde_exam_segment *segment = &map->segment[i];
       enum { ALL = SLIDES + STEADY };
@@ -203,12 +206,17 @@ static void find_stations(const sonde_model *model, const sonde_limb *limb, sond
           if (isfinite(met.z) || v + 1 == segment->vein_count) at[step + ALL] = met;
         }
       }
-      int best = 0, least = INT_MAX; // the nearest steady one, else the nearest that is there
+      int best = 0, least = INT_MAX; // the nearest of the best kind
+      const sonde_vec3 beam = q_rotate(to->probe.rotation, vec3(0, 0, 1));
       for (int step = -SLIDES; step <= SLIDES; ++step) {
+        const sonde_vec3 *here = &at[step + ALL];
         bool steady = true;
-        for (int n = -STEADY; n <= STEADY; ++n) steady &= isfinite(at[step + n + ALL].z);
-        int rank = abs(step) + (steady ? 0 : 2 * SLIDES);
-        if (isfinite(at[step + ALL].z) && rank < least) least = rank, best = step;
+        for (int n = -STEADY; n <= STEADY; ++n) steady &= isfinite(here[n].z);
+        bool across = steady;
+        for (int n = -STEADY; n < STEADY && across; ++n)
+          across = fabs(v_dot(v_unit(v_sub(here[n + 1], here[n]), beam), beam)) < MOST_ALONG_BEAM;
+        const int rank = abs(step) + 2 * SLIDES * (!steady + !across);
+        if (isfinite(here->z) && rank < least) least = rank, best = step;
       }
       to->vein_m[i] = at[best + ALL];
       to->slide_m[i] = SLIDE_M * best;

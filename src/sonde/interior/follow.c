@@ -7,7 +7,10 @@
 #include <string.h>
 
 static const double slack_t_m = 9e-3, slack_s_m = 7e-3, slack_half_m = 6e-3;
-static const double start_at = 0.5, exact = 0.05; // of the slack
+// Of the slack: where the next window begins, by how much of the way so far it is placed ahead of
+// the probe, and up to where a window holds the touched skin in its fine part.
+static const double start_at = 0.35, lead = 0.6, most_off = 1.25;
+static const double exact = 0.05; // of the slack, for a window that is made at once
 
 static double distance(const sonde_interior *in, sonde_footprint a, sonde_footprint b) {
   sonde_column_point at;
@@ -34,19 +37,24 @@ void sonde_interior_build_ahead(sonde_interior *in) {
 
 // A window takes the same number of updates everywhere; the work may be done earlier (from the
 // cache, or between updates) or later (after a recall). At rest in time (dt < 0) it is made at
-// once.
+// once, and so it is where updates wait for their windows.
 bool sonde_interior_follow(sonde_interior *in, const sonde_interior_input *input) {
   SONDE_ASSERT(in->live != NULL && in->next != NULL);
-  const bool at_once = input->dt_s < 0;
+  const bool still = input->dt_s < 0, at_once = still || in->waits;
   sonde_footprint footprint;
   bool within;
   if (in->method != SONDE_INTERIOR_SOLID || !sonde_grid_footprint(in, input, &footprint, &within) ||
       !within)
     return false;
   double off = in->live->ready ? distance(in, in->live->grid.footprint, footprint) : INFINITY;
-  if (in->building && distance(in, in->next->grid.footprint, footprint) > 1) in->building = false;
-  if (!in->building && off > (at_once ? exact : start_at)) {
-    const double at[4] = {footprint.theta, footprint.s, footprint.half_theta_m, footprint.half_s_m};
+  if (in->building && distance(in, in->next->grid.footprint, footprint) > (still ? exact : 1))
+    in->building = false;
+  if (!in->building && off > (still ? exact : start_at)) {
+    const sonde_footprint *was = &in->live->grid.footprint;
+    const double on = !still && off < 2 * start_at ? lead : 0; // the probe goes on as it went
+    const double at[4] = {
+        footprint.theta + on * remainder(footprint.theta - was->theta, 2 * SONDE_PI),
+        footprint.s + on * (footprint.s - was->s), footprint.half_theta_m, footprint.half_s_m};
     sonde_interior_next_window(in, at);
     in->building = true, in->built = 0;
   }
@@ -58,7 +66,8 @@ bool sonde_interior_follow(sonde_interior *in, const sonde_interior_input *input
     if (due && in->next->ready) swap(in);
     if (due) in->building = false;
   }
-  if (!in->live->ready || distance(in, in->live->grid.footprint, footprint) > 1) return false;
+  if (!in->live->ready || distance(in, in->live->grid.footprint, footprint) > most_off)
+    return false;
   return sonde_window_update(in->live, in, input);
 }
 

@@ -66,6 +66,11 @@ void sonde_interior_for_vessels(sonde_interior *interior, bool only) {
   interior->vessels_only = only;
 }
 
+void sonde_interior_wait(sonde_interior *interior, bool waits) {
+  SONDE_ASSERT(interior != NULL);
+  interior->waits = waits;
+}
+
 sonde_interior_method sonde_interior_used_method(const sonde_interior *interior) {
   SONDE_ASSERT(interior != NULL);
   return interior->solid ? SONDE_INTERIOR_SOLID : SONDE_INTERIOR_COLUMNS;

@@ -127,6 +127,7 @@ struct sonde_interior {
   bool solid;                  // the last update was solved by the solid
   sonde_interior_method method;
   bool vessels_only;     // of the updates: no tissue is read beside the vessels
+  bool waits;            // of the updates: for their windows
   uint32_t vessel_count; // femoral vein, femoral artery, branches
   sonde_vessel_course course[SONDE_VESSELS];
   sonde_vessel_section *section[SONDE_VESSELS]; // [count], of the femoral vessels [SONDE_SECTIONS]
@@ -204,6 +205,9 @@ SONDE_LINK sonde_status sonde_interior_recall(sonde_interior *interior,
 // load folds, and let no wall shape the tissue beside it. Pressures and areas of all sections are
 // the same to the bit; their middles lack what the repair would have moved them. @thread owner
 SONDE_LINK void sonde_interior_for_vessels(sonde_interior *interior, bool only);
+// Whether an update waits for a window that the probe's way asks for, some 0.4 s each, instead of
+// sharing its factorisation among many updates: for work that no hand waits for. @thread owner
+SONDE_LINK void sonde_interior_wait(sonde_interior *interior, bool waits);
 // Room for factored windows that are not in use. @thread owner
 SONDE_LINK sonde_status sonde_interior_cache_windows(sonde_interior *interior, uint32_t count,
                                                      sonde_error *error);

@@ -22,7 +22,7 @@ enum {
   SONDE_WINDOW_TOUCHED = 512 // points of contact that are used
 };
 
-enum { SONDE_WINDOW_BUDGET = 4000000 }; // multiplications per update of a running session
+enum { SONDE_WINDOW_BUDGET = 8000000 }; // multiplications per update of a running session
 
 // One touched point of the skin.
 typedef struct sonde_touched {
