@@ -154,6 +154,39 @@ static sonde_vec3 cross_line(const sonde_vessel *line, sonde_pose probe) {
   return found;
 }
 
+// A vein that begins or ends beside the station is looked for within a finger's breadth, where it
+// stays in the plane when the tissue moves a little under the press, and where it runs across the
+// plane: along the beam, as in the arch of a saphenous vein, a press hardly closes it.
+static void find_vein(const sonde_model *model, const sonde_exam_segment *segment, uint32_t number,
+                      sonde_map_station *to) {
+  enum { ALL = SLIDES + STEADY };
+  const sonde_vec3 y = q_rotate(to->probe.rotation, vec3(0, 1, 0));
+  const sonde_vec3 beam = q_rotate(to->probe.rotation, vec3(0, 0, 1));
+  sonde_vec3 at[2 * ALL + 1];
+  for (int step = -ALL; step <= ALL; ++step) {
+    sonde_pose probe = to->probe;
+    probe.position = v_madd(probe.position, (y.z < 0 ? -SLIDE_M : SLIDE_M) * step, y);
+    for (uint32_t v = segment->vein_count; v-- > 0;) {
+      const uint32_t branch = segment->vein[v] - TRAINER_FIRST_BRANCH;
+      sonde_vec3 met = cross_line(&model->anatomy->branch[branch].line, probe);
+      if (isfinite(met.z) || v + 1 == segment->vein_count) at[step + ALL] = met;
+    }
+  }
+  int best = 0, least = INT_MAX; // the nearest of the best kind
+  for (int step = -SLIDES; step <= SLIDES; ++step) {
+    const sonde_vec3 *here = &at[step + ALL];
+    bool steady = true;
+    for (int n = -STEADY; n <= STEADY; ++n) steady &= isfinite(here[n].z);
+    bool across = steady;
+    for (int n = -STEADY; n < STEADY && across; ++n)
+      across = fabs(v_dot(v_unit(v_sub(here[n + 1], here[n]), beam), beam)) < MOST_ALONG_BEAM;
+    const int rank = abs(step) + 2 * SLIDES * (!steady + !across);
+    if (isfinite(here->z) && rank < least) least = rank, best = step;
+  }
+  to->vein_m[number] = at[best + ALL];
+  to->slide_m[number] = SLIDE_M * best;
+}
+
 // Stations of a limb in the model's frame: the probe as the limb has it, left and right of the
 // image as at the model's site.
 static void find_stations(const sonde_model *model, const sonde_limb *limb, sonde_vein_map *map) {
@@ -187,39 +220,9 @@ static void find_stations(const sonde_model *model, const sonde_limb *limb, sond
       if (strcmp(OTHER[i][0], to->name) == 0) to->segment = sonde_vein_segment(map, OTHER[i][1]);
     if (to->segment == SONDE_SEGMENTS && isfinite(main_m.z))
       to->segment = sonde_vein_segment_at(map, main_m.z);
-    // A vein that begins or ends beside the station is looked for within a finger's breadth, where
-    // it stays in the plane when the tissue moves a little under the press, and where it runs
-    // across the plane: along the beam, as in the arch of a saphenous vein, a press hardly closes
-    // it.
     for (uint32_t i = 0; i < map->segment_count; ++i) {
-      const sonde_exam_segment *segment = &map->segment[i];
-      enum { ALL = SLIDES + STEADY };
-      sonde_vec3 at[2 * ALL + 1], y = q_rotate(to->probe.rotation, vec3(0, 1, 0));
       to->vein_m[i] = main_m;
-      if (segment->vein_count == 0) continue;
-      for (int step = -ALL; step <= ALL; ++step) {
-        sonde_pose probe = to->probe;
-        probe.position = v_madd(probe.position, (y.z < 0 ? -SLIDE_M : SLIDE_M) * step, y);
-        for (uint32_t v = segment->vein_count; v-- > 0;) {
-          const uint32_t branch = segment->vein[v] - TRAINER_FIRST_BRANCH;
-          sonde_vec3 met = cross_line(&model->anatomy->branch[branch].line, probe);
-          if (isfinite(met.z) || v + 1 == segment->vein_count) at[step + ALL] = met;
-        }
-      }
-      int best = 0, least = INT_MAX; // the nearest of the best kind
-      const sonde_vec3 beam = q_rotate(to->probe.rotation, vec3(0, 0, 1));
-      for (int step = -SLIDES; step <= SLIDES; ++step) {
-        const sonde_vec3 *here = &at[step + ALL];
-        bool steady = true;
-        for (int n = -STEADY; n <= STEADY; ++n) steady &= isfinite(here[n].z);
-        bool across = steady;
-        for (int n = -STEADY; n < STEADY && across; ++n)
-          across = fabs(v_dot(v_unit(v_sub(here[n + 1], here[n]), beam), beam)) < MOST_ALONG_BEAM;
-        const int rank = abs(step) + 2 * SLIDES * (!steady + !across);
-        if (isfinite(here->z) && rank < least) least = rank, best = step;
-      }
-      to->vein_m[i] = at[best + ALL];
-      to->slide_m[i] = SLIDE_M * best;
+      if (map->segment[i].vein_count > 0) find_vein(model, &map->segment[i], i, to);
     }
   }
 
