@@ -1,4 +1,5 @@
 // sonde dataset: a population of legs, pressed and drawn, with labels, for machine learning.
+#include "dataset_hdf5.h"
 #include "options.h"
 
 #include <assert.h>
@@ -17,8 +18,8 @@ typedef struct options {
 
 static const options DEFAULTS = {.legs = -1, .seed = -1, .part = 1, .parts = 1};
 
-enum { TAR, FOLDER };
-static const char *const FORMATS[] = {"tar", "folder", NULL};
+enum { TAR, FOLDER, HDF5 };
+static const char *const FORMATS[] = {"tar", "folder", "hdf5", NULL};
 
 static const app_option TABLE[] = {
     OPT_TEXT(plan, "plan", "YAML",
@@ -29,7 +30,9 @@ static const app_option TABLE[] = {
     OPT_TEXT(shard, "shard", "I/N",
              "make every N-th leg from the I-th: the work of one of N processes"),
     OPT_WORD(format, "format", "FORMAT", FORMATS,
-             "a tar file for each leg (WebDataset), or a folder of PNG, NPY and JSON files"),
+             "a tar file for each leg (WebDataset), a folder of PNG, NPY and JSON files, or an "
+             "HDF5 file, where the "
+             "program was built with libhdf5"),
     OPT_TEXT(directory, "o,output", "DIR", "where to write; made when it is absent"),
     OPT_TEXT(check, "check", "DIR",
              "read a whole data set and compare every file with its SHA-256"),
@@ -42,6 +45,8 @@ static int check_options(void *from) {
     return app_usage_error(VERB, "expected one of -o DIR, --check DIR and --show-plan");
   if (o->check && (o->plan || o->shard || o->legs >= 0 || o->seed >= 0))
     return app_usage_error(VERB, "--check takes no plan, count, seed or shard");
+  if (o->format == HDF5 && !dataset_hdf5())
+    return app_usage_error(VERB, "this program was built without libhdf5, expected tar or folder");
   if (!o->shard) return APP_OK;
   int used = 0;
   if (sscanf(o->shard, "%9u/%9u%n", &o->part, &o->parts, &used) != 2 || o->shard[used] ||
@@ -86,6 +91,7 @@ static int run(void *from) {
   def.plan = &plan, def.directory = o->directory;
   def.shard = o->part, def.shards = o->parts;
   def.folder = o->format == FOLDER;
+  if (o->format == HDF5) def.format = dataset_hdf5();
   if (app_bundled_model(bundled, sizeof bundled, searched, sizeof searched)) def.bundled = bundled;
   if (app_data_directory("scanners", scanners, sizeof scanners)) def.scanners = scanners;
   const sonde_progress progress = app_progress();

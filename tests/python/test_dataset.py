@@ -1,5 +1,6 @@
 """A data set read with the standard library and NumPy, as its example does: masks lie on what the picture shows,
 closure is what the labels say, strain and displacement are of the same tissue."""
+import json
 import os
 import subprocess
 import sys
@@ -10,6 +11,11 @@ import numpy as np
 
 sys.path.insert(0, os.path.join(os.environ["SONDE_SOURCE"], "python/examples"))
 import read_dataset  # noqa: E402
+
+try:
+    import h5py
+except ImportError:
+    h5py = None
 
 PLAN = """sonde_dataset: 1
 body: bundled
@@ -38,6 +44,20 @@ class DataSet(unittest.TestCase):
                            check=True, capture_output=True)
             cls.rows = read_dataset.main(folder + "/set")
             cls.frames = list(read_dataset.frames(folder + "/set"))
+            cls.stacked = cls.read_hdf5(folder) if h5py else None
+
+    @staticmethod
+    def read_hdf5(folder):
+        sets = []
+        for name in ("one", "two"):
+            made = subprocess.run([os.environ["SONDE_PROGRAM"], "dataset", "--plan", folder + "/plan.yaml",
+                                   "--format", "hdf5", "-o", f"{folder}/{name}"], capture_output=True, text=True)
+            if "without libhdf5" in made.stderr:
+                return None
+            sets.append(open(f"{folder}/{name}/leg-000000.h5", "rb").read())
+        assert sets[0] == sets[1], "two runs made other bytes"
+        with h5py.File(f"{folder}/one/leg-000000.h5") as file:
+            return {name: file[name][()] for name in file}
 
     def test_members(self):
         self.assertEqual([f["key"] for f in self.frames], ["000000_00_00", "000000_00_01"])
@@ -46,6 +66,16 @@ class DataSet(unittest.TestCase):
                 "clot": (96, 96), "displacement": (96, 96, 3), "envelope": (1024, 192), "image": (96, 96),
                 "strain": (96, 96, 6), "tissue": (96, 96), "vessel": (96, 96)})
             self.assertEqual(set(np.unique(f["clot"])), {0})
+
+    def test_hdf5_holds_the_same(self):
+        if self.stacked is None:
+            self.skipTest("no h5py, or no libhdf5 in the program")
+        for i, f in enumerate(self.frames):
+            self.assertEqual(self.stacked["key"][i].decode(), f["key"])
+            self.assertEqual(json.loads(self.stacked["json"][i]), f["json"])
+            for name, value in f.items():
+                if name not in ("key", "json"):
+                    np.testing.assert_array_equal(self.stacked[name][i], value)
 
     def test_force_and_wrench(self):
         for f, force in zip(self.frames, (1, 4)):
