@@ -8,12 +8,27 @@
 #include "limb/muscles.h"
 #include "limb/vessels.h"
 
-#define FAMILY (uint32_t) SAMPLES(30, 8)
+enum { MOST = 30 };
+#define FAMILY (uint32_t) SAMPLES(MOST, 6)
 
 static uint32_t muscle_named(const char *name) {
   for (uint32_t k = 0; k < sonde_limb_muscle_count(); ++k)
     if (!strcmp(limb_muscle_table[k].name, name)) return k;
   fail_msg("no muscle is called %s", name);
+  return 0;
+}
+
+static sonde_limb *family[MOST];
+
+static int make_family(void **state) {
+  (void)state;
+  for (uint32_t k = 0; k < FAMILY; ++k) family[k] = limb_of_family(k, SONDE_LIMB_RIGHT);
+  return 0;
+}
+
+static int drop_family(void **state) {
+  (void)state;
+  for (uint32_t k = 0; k < FAMILY; ++k) sonde_limb_destroy(family[k]);
   return 0;
 }
 
@@ -23,7 +38,7 @@ static void cells_have_their_areas_and_cover_the_section(void **state) {
   double worst = 0, sum = 0;
   uint32_t checked = 0, off = 0;
   for (uint32_t k = 0; k < FAMILY; ++k) {
-    sonde_limb *limb = limb_of_family(k, SONDE_LIMB_RIGHT);
+    sonde_limb *limb = family[k];
     for (double level = -0.097 + 0.02 * (k % 7); level < 1.95; level += 0.3) {
       double area[LIMB_CELLS] = {0}, within = 0, other = 0, step = 0.001;
       sonde_vec3 c = limb_centre(limb, level);
@@ -59,7 +74,6 @@ static void cells_have_their_areas_and_cover_the_section(void **state) {
         worst = fmax(worst, error), sum += error, ++checked, off += error > 0.05;
       }
     }
-    sonde_limb_destroy(limb);
   }
   print_message("%u sections of muscles: mean error %.2f %%, %u beyond 5 %%, worst %.1f %%\n",
                 checked, 100 * sum / checked, off, 100 * worst);
@@ -122,7 +136,7 @@ static void muscles_stand_where_an_atlas_has_them(void **state) {
               {"flexor digitorum longus", 1.5, 57},
               {"flexor hallucis longus", 1.5, 245}};
   for (uint32_t k = 0; k < (uint32_t)SAMPLES(12, 4); ++k) {
-    sonde_limb *limb = limb_of_family(k, SONDE_LIMB_RIGHT);
+    sonde_limb *limb = family[k];
     for (size_t i = 0; i < SONDE_COUNT_OF(rows); ++i) {
       uint32_t wanted = muscle_named(rows[i].name);
       double x = 0, y = 0;
@@ -150,14 +164,13 @@ static void muscles_stand_where_an_atlas_has_them(void **state) {
       if (gap > 0.004)
         fail_msg("member %u level %g: %.1f mm from tibia to fascia", k, level, gap * 1e3);
     }
-    sonde_limb_destroy(limb);
   }
 }
 
 static void fibres_run_down_with_their_pennation(void **state) {
   (void)state;
   uint32_t random = 5, found = 0;
-  sonde_limb *limb = limb_of_family(5, SONDE_LIMB_RIGHT);
+  sonde_limb *limb = family[5];
   for (int i = 0; i < 20000; ++i) {
     sonde_vec3 fibre,
         p = sonde_limb_point(limb, 2 * next_uniform(&random), 2 * SONDE_PI * next_uniform(&random),
@@ -171,7 +184,6 @@ static void fibres_run_down_with_their_pennation(void **state) {
     assert_true(fibre.z < 0);
   }
   assert_true(found > 8000);
-  sonde_limb_destroy(limb);
 }
 
 int main(void) {
@@ -179,5 +191,5 @@ int main(void) {
                                      cmocka_unit_test(volumes_are_those_of_the_rule),
                                      cmocka_unit_test(muscles_stand_where_an_atlas_has_them),
                                      cmocka_unit_test(fibres_run_down_with_their_pennation)};
-  return cmocka_run_group_tests(tests, NULL, NULL);
+  return cmocka_run_group_tests(tests, make_family, drop_family);
 }

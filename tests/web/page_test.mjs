@@ -7,7 +7,7 @@ import { existsSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
 import { addressOf, PATIENCE_MS } from "./drive.mjs";
-import { startRun } from "./program.mjs";
+import { FEW_IMAGES, startRun } from "./program.mjs";
 
 const [, , program, model, webDir, outDir] = process.argv;
 const { chromium } = createRequire(path.join(webDir, "package.json"))("playwright-core");
@@ -181,7 +181,7 @@ async function testLoss(page, server) {
 async function main() {
   mkdirSync(outDir, { recursive: true });
   const profile = mkdtempSync(path.join(tmpdir(), "sonde-web-"));
-  const server = await startRun(program, [model, "--port", "0"]);
+  const server = await startRun(program, [model, "--port", "0", ...FEW_IMAGES]);
   const address = server.learner;
   let browser = null;
   try {
