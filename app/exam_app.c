@@ -154,6 +154,7 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
     pthread_mutex_unlock(&app->lock);
     return put_note(app, SONDE_NOTE_HINT, NULL, 0, tick, error);
   }
+  case SONDE_PAGE_WORKSHEET: return exam_app_write_sheet(app, request->entry, error);
   case SONDE_PAGE_POSITION: return exam_turn(app, request->id, error);
   case SONDE_PAGE_FINISH_EXAM: return exam_finish(app, error);
   case SONDE_PAGE_LEAVE_EXAM: return exam_app_practice(app, error);
@@ -196,6 +197,7 @@ void exam_app_turn(exam_app *app) {
   if (!asked && now_s - app->published_s < TELL_EVERY_S) return;
   app->published_s = now_s;
   exam_app_tell_exam(app);
+  if (asked) exam_app_tell_sheet(app);
   exam_app_tell_replay(app);
 }
 

@@ -22,7 +22,8 @@ sonde_status exam_prepare(exam *of, const char *bundled, const char *cases,
   sonde_status status = sonde_exam_prepare(&of->patient, of->protocol, bundled, cases, progress,
                                            &of->setups, &of->plan, error);
   if (!status) status = sonde_judge_create(&of->setups.held[0].map, &of->plan, &of->judge, error);
-  of->held = 0, of->part = 1;
+  of->held = 0, of->part = of->watched_part = 1;
+  if (!status) sonde_worksheet_begin(&of->sheet, &of->setups, &of->plan);
   if (!status && !(of->sample = calloc(EXAM_SAMPLES, sizeof *of->sample)))
     status = app_error(error, SONDE_MEMORY, "out of memory");
   return status;
@@ -162,22 +163,12 @@ sonde_status exam_turn(exam_app *app, const char *position, sonde_error *error) 
 
 // ---- watching
 
-// Means of 2 x 2 pixels.
 static void keep_picture(const sonde_frame *frame, double vein, exam_picture *picture) {
-  assert(frame->pixels && frame->width > 1 && frame->height > 1);
   sonde_image *image = &picture->image;
   if (!image->pixels &&
       sonde_image_create(frame->width / 2, frame->height / 2, image, NULL) != SONDE_OK)
     return;
-  for (uint32_t y = 0; y < image->height; ++y)
-    for (uint32_t x = 0; x < image->width; ++x) {
-      const uint8_t *p = frame->pixels + 2 * (size_t)y * frame->width + 2 * (size_t)x;
-      image->pixels[y * image->width + x] =
-          (uint8_t)((p[0] + p[1] + p[frame->width] + p[frame->width + 1] + 2) / 4);
-    }
-  image->width_m = frame->width_m;
-  image->height_m = frame->height_m;
-  image->tick = frame->snapshot.tick;
+  exam_shrink(frame, image);
   picture->vein_ratio = vein;
 }
 
@@ -188,6 +179,7 @@ void exam_hold(exam *of, uint32_t held) {
   sonde_image_clear(&of->open.image);
   sonde_image_clear(&of->closed.image);
   of->held = held, of->turns = false;
+  exam_sheet_turn(of);
 }
 
 void exam_observe(exam *of, const sonde_frame *frame) {
@@ -196,6 +188,7 @@ void exam_observe(exam *of, const sonde_frame *frame) {
   uint32_t presses, n = of->sample_count;
   sonde_judge_feed(of->judge, s);
   of->seen_tick = s->tick;
+  exam_sheet_watch(of, frame);
 
   // The press that just ended takes both images.
   sonde_judge_compressions(of->judge, &presses);
@@ -227,6 +220,13 @@ void exam_observe(exam *of, const sonde_frame *frame) {
 
 // ---- the end
 
+void exam_score(exam *of) {
+  assert(of->judge);
+  sonde_judge_finish(of->judge);
+  sonde_judge_score(of->judge, &of->patient, &of->score);
+  sonde_worksheet_judge(&of->sheet, &of->patient, &of->setups, &of->plan, &of->verdict);
+}
+
 // What the disk does not take is told and tried again by exam_app_keep().
 sonde_status exam_finish(exam_app *app, sonde_error *error) {
   exam *of = app->exam;
@@ -234,8 +234,7 @@ sonde_status exam_finish(exam_app *app, sonde_error *error) {
     return app_error(error, SONDE_ARGUMENT, "there is no exam to finish");
   exam_app_set_phase(app, EXAM_DONE, "");
   sonde_session_stop(app->session); // from here on nothing is watched
-  sonde_judge_finish(of->judge);
-  sonde_judge_score(of->judge, &of->patient, &of->score);
+  exam_score(of);
   of->scored = true;
   exam_app_keep(app);
   exam_app_tell_exam(app);
@@ -250,6 +249,7 @@ void exam_destroy(exam *of) {
   }
   sonde_image_clear(&of->open.image);
   sonde_image_clear(&of->closed.image);
+  exam_sheet_clear(of);
   free(of->sample);
   free(of->comments.list);
   sonde_judge_destroy(of->judge);

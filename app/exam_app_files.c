@@ -33,7 +33,9 @@ sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
   if (!of->filed) {
     char json[EXAM_PATH], csv[EXAM_PATH];
     sonde_score_note note = note_of(of);
+    const bool written = of->sheet.written;
     status = sonde_score_save(of->judge, &of->patient, &of->score, &note,
+                              written ? &of->sheet : NULL, written ? &of->verdict : NULL,
                               exam_app_path(json, of->directory, "exam.json"),
                               exam_app_path(csv, of->directory, "exam.csv"), error);
     if (!status) {
@@ -55,6 +57,7 @@ sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
                                   .comment_count = of->comments.count,
                                   .recording = "exam.rec"};
 
+      if (of->sheet.written) report.worksheet = &of->sheet, report.verdict = &of->verdict;
       // The trainee's exams before this one: a report does not depend on when it is made.
       status = sonde_exam_log_list(log, name_of(of), 0, &earlier, &count, error);
       if (!status) {
@@ -76,6 +79,7 @@ sonde_status exam_save(sonde_exam_log *log, exam *of, sonde_error *error) {
         sonde_free(earlier);
       }
     }
+    if (!status) status = exam_sheet_save(of, error);
     of->filed = !status;
   }
   sonde_error own = {0};

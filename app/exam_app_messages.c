@@ -247,6 +247,7 @@ void exam_app_tell_exam(exam_app *app) {
     const sonde_plan_point *point = &of->plan.point[g.point];
     sonde_json_begin_object(&out, "target");
     sonde_json_put_text(&out, "name", point->title);
+    sonde_json_put_integer(&out, "place", g.point);
     put_vector(&out, "position_mm", point->at.skin_m, 1e3);
     put_vector(&out, "normal", point->at.normal, 1);
     put_vector(&out, "across", point->at.across, 1);

@@ -14,7 +14,8 @@ enum {
   EXAM_PICTURES = 64,
   EXAM_SAMPLES = 36000,
   EXAM_SENTENCE = 240,
-  EXAM_PARTS = 32 // of a recording, one for each time that the patient lies otherwise
+  EXAM_PARTS = 32, // of a recording, one for each time that the patient lies otherwise
+  EXAM_LOOKS = 64  // newest images, one of which the learner may store
 };
 
 typedef enum exam_phase {
@@ -30,6 +31,15 @@ typedef struct exam_picture {
   sonde_image image;
   double vein_ratio;
 } exam_picture;
+
+// An image that was seen, at half its size, and its moment.
+typedef struct exam_look {
+  bool there;
+  sonde_image image;
+  sonde_snapshot snapshot;
+  uint32_t part, held;
+  double time_s; // of the exam
+} exam_look;
 
 // An exam, running or done.
 typedef struct exam {
@@ -58,6 +68,11 @@ typedef struct exam {
   exam_picture open, closed;                 // of the press under way
   sonde_exam_sample *sample;                 // [EXAM_SAMPLES] ten a second
   uint32_t sample_count;
+  sonde_worksheet sheet;
+  sonde_sheet_verdict verdict; // when it is scored
+  uint32_t watched_part;       // of the recording, that the looks are of
+  uint32_t next_look;
+  exam_look look[EXAM_LOOKS], kept_look; // ring; the one that the learner has frozen
 } exam;
 
 // Where cases and thighs are.
@@ -161,8 +176,26 @@ void exam_observe(exam *of, const sonde_frame *frame); // under the lock, as the
 // What is observed from now on is of another setup's position.
 void exam_hold(exam *of, uint32_t held);
 sonde_status exam_finish(exam_app *app, sonde_error *error);
+// Judge and worksheet come to their result.
+void exam_score(exam *of);
 // The session must be gone.
 void exam_destroy(exam *of);
+
+// exam_app_sheet.c: the worksheet.
+// Means of 2 x 2 pixels. @param image of half the frame's width and height
+void exam_shrink(const sonde_frame *frame, sonde_image *image);
+// Remembers an image that the learner may store; under the lock.
+void exam_sheet_watch(exam *of, const sonde_frame *frame);
+// Another part of the recording begins: what was seen is out of reach.
+void exam_sheet_turn(exam *of);
+// Takes an entry, from the page or from the journal; under the lock.
+sonde_status exam_sheet_enter(exam *of, const char *entry, sonde_error *error);
+// The page's entry: taken, noted in the journal, its picture on the disk.
+sonde_status exam_app_write_sheet(exam_app *app, const char *entry, sonde_error *error);
+void exam_app_tell_sheet(exam_app *app);
+// Its files, in the exam's directory. @param map of the first setup
+sonde_status exam_sheet_save(const exam *of, sonde_error *error);
+void exam_sheet_clear(exam *of);
 
 // exam_app_files.c: the journal's notes, and what is derived of an exam that is over.
 // A JSON object of texts {key, value}. @param text freed by sonde_free()

@@ -141,7 +141,8 @@ static bool read_entry(const char *directory, const char *id, sonde_log_entry *e
 
 void exam_recover_log(const char *exams, sonde_exam_log *log, exam_recovered *found) {
   // Keyframes, result, table and report are made again.
-  static const char *const MADE[] = {"exam.json", "exam.csv", "report.html"};
+  static const char *const MADE[] = {"exam.json", "exam.csv", "report.html", "worksheet.json",
+                                     "worksheet.csv"};
   *found = (exam_recovered){0};
   DIR *list = opendir(exams);
   for (const struct dirent *item; list && (item = readdir(list));) {
@@ -220,6 +221,7 @@ static sonde_status fill(exam *of, const sonde_json *setup, const exam_places *p
 
 static void apply_note(exam *of, const sonde_note *note) {
   if (note->kind == SONDE_NOTE_HINT) sonde_judge_hint(of->judge);
+  if (note->kind == SONDE_NOTE_WORKSHEET) (void)exam_sheet_enter(of, note->text, NULL);
   if (note->kind != SONDE_NOTE_DECISION) return;
   char segment[32], word[32];
   sonde_decision decision;
@@ -230,6 +232,49 @@ static void apply_note(exam *of, const sonde_note *note) {
   if (sonde_decision_parse(word, &decision))
     (void)sonde_judge_decide(of->judge, sonde_vein_segment(&of->setups.held[0].map, segment),
                              decision, NULL);
+}
+
+// Part by part, image by image as the exam was judged, each note after the last image before it.
+static sonde_status play(exam *of, uint32_t parts, sonde_error *error) {
+  assert(of && parts > 0);
+  char path[EXAM_PATH];
+  sonde_status status = SONDE_OK;
+  for (uint32_t part = 1; part <= parts && !status; ++part) {
+    sonde_limb_position position;
+    sonde_notes said = {0};
+    sonde_player *player = NULL;
+    sonde_frame frame;
+    uint32_t held = 0, next = 0;
+    if (exam_part_position(of->directory, part, &position)) // else from before positions
+      held = sonde_exam_setups_find(&of->setups, position);
+    if (held == of->setups.count)
+      status = app_error(error, SONDE_MISMATCH, "%.300s: %s is no position of the protocol",
+                         of->directory, sonde_position_key(position));
+    if (status) break;
+    if (part > 1) exam_hold(of, held);
+    sonde_player_def def = {.path = exam_part_path(path, of->directory, part),
+                            .model = of->setups.held[held].model,
+                            .findings = &of->setups.held[held].findings,
+                            .recover = true,
+                            .no_cache = true};
+    sonde_progress progress = app_progress();
+    status = sonde_notes_load(path, &said, error);
+    if (!status) status = sonde_player_open(&def, &player, error);
+    while (!status && sonde_player_next_image(player, true)) {
+      if (!sonde_player_frame(player, &frame)) continue;
+      while (next < said.count && said.list[next].tick < frame.snapshot.tick)
+        apply_note(of, &said.list[next++]);
+      exam_observe(of, &frame);
+      double share = sonde_player_time(player) / fmax(sonde_player_info(player)->duration_s, 1e-3);
+      if (!progress.report(share, of->id, progress.user))
+        status = app_error(error, SONDE_CANCELLED, "cancelled in exam %s", of->id);
+    }
+    while (next < said.count) apply_note(of, &said.list[next++]);
+    app_progress_end();
+    sonde_player_close(player);
+    sonde_notes_clear(&said);
+  }
+  return status;
 }
 
 static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *log, bool *derived,
@@ -245,60 +290,31 @@ static sonde_status derive(exam *of, const exam_places *places, sonde_exam_log *
   const uint32_t parts = exam_part_count(of->directory);
   const sonde_note *setup = sonde_notes_last(&notes.first, SONDE_NOTE_SETUP);
   const sonde_note *score = sonde_notes_last(notes.last, SONDE_NOTE_SCORE);
-  sonde_json *root = setup && score ? parse(setup->text) : NULL;
-  if (root) { // an interrupted exam has no result
+  // An interrupted exam has no result, but what was written in its worksheet stays.
+  bool wanted = score != NULL;
+  for (uint32_t part = 1; part <= parts && !wanted && !exists(of->directory, "worksheet.json");
+       ++part) {
+    sonde_notes said;
+    if (sonde_notes_load(exam_part_path(path, of->directory, part), &said, NULL)) continue;
+    wanted = sonde_notes_last(&said, SONDE_NOTE_WORKSHEET) != NULL;
+    sonde_notes_clear(&said);
+  }
+  sonde_json *root = setup && wanted ? parse(setup->text) : NULL;
+  if (root) {
     status = fill(of, root, places, &protocol, error);
-    // Part by part, image by image as the exam was judged, each note after the last image before
-    // it.
-    for (uint32_t part = 1; part <= parts && !status; ++part) {
-      sonde_limb_position position;
-      sonde_notes said = {0};
-      sonde_player *player = NULL;
-      sonde_frame frame;
-      uint32_t held = 0, next = 0;
-      if (exam_part_position(of->directory, part, &position)) // else from before positions
-        held = sonde_exam_setups_find(&of->setups, position);
-      if (held == of->setups.count)
-        status = app_error(error, SONDE_MISMATCH, "%.300s: %s is no position of the protocol",
-                           of->directory, sonde_position_key(position));
-      if (status) break;
-      if (part > 1) exam_hold(of, held);
-      sonde_player_def def = {.path = exam_part_path(path, of->directory, part),
-                              .model = of->setups.held[held].model,
-                              .findings = &of->setups.held[held].findings,
-                              .recover = true,
-                              .no_cache = true};
-      sonde_progress progress = app_progress();
-      status = sonde_notes_load(path, &said, error);
-      if (!status) status = sonde_player_open(&def, &player, error);
-      while (!status && sonde_player_next_image(player, true)) {
-        if (!sonde_player_frame(player, &frame)) continue;
-        while (next < said.count && said.list[next].tick < frame.snapshot.tick)
-          apply_note(of, &said.list[next++]);
-        exam_observe(of, &frame);
-        double share =
-            sonde_player_time(player) / fmax(sonde_player_info(player)->duration_s, 1e-3);
-        if (!progress.report(share, of->id, progress.user))
-          status = app_error(error, SONDE_CANCELLED, "cancelled in exam %s", of->id);
-      }
-      while (next < said.count) apply_note(of, &said.list[next++]);
-      app_progress_end();
-      sonde_player_close(player);
-      sonde_notes_clear(&said);
-    }
-    if (!status) {
-      sonde_judge_finish(of->judge);
-      sonde_judge_score(of->judge, &of->patient, &of->score);
+    if (!status) status = play(of, parts, error);
+    if (!status && score) {
+      exam_score(of);
       status = sonde_log_entry_parse(score->text, &told, error);
     }
     // The judge of another version may see it differently: the score that the learner was told
     // stands.
-    if (!status && fabs(told.score - of->score.score) >= 1e-6)
+    if (!status && score && fabs(told.score - of->score.score) >= 1e-6)
       status = app_error(error, SONDE_MISMATCH,
                          "%.300s: the score was %.1f, this version of the program comes to %.1f; "
                          "its files are not made",
                          of->directory, told.score, of->score.score);
-    if (!status) status = exam_save(log, of, error);
+    if (!status) status = score ? exam_save(log, of, error) : exam_sheet_save(of, error);
     *derived = !status;
   }
   sonde_json_free(root);
@@ -316,8 +332,10 @@ sonde_status exam_derive(const exam_places *places, const char *exams, const cha
   bool whole = exists(of->directory, "exam.json") && exists(of->directory, "exam.csv") &&
                exists(of->directory, "report.html");
   sonde_status status = SONDE_OK;
-  exam_app_path(path, of->directory, "exam.rec");
-  if (!whole && exists(of->directory, "exam.rec") && !sonde_recording_is_open(path))
+  bool open = false;
+  for (uint32_t part = exam_part_count(of->directory); part > 0 && !open; --part)
+    open = sonde_recording_is_open(exam_part_path(path, of->directory, part));
+  if (!whole && exists(of->directory, "exam.rec") && !open)
     status = derive(of, places, log, derived, error);
   exam_destroy(of);
   return status;

@@ -69,7 +69,7 @@ int exam_recover(const exam_library *library, const char *directory, bool json) 
     printf("%u exams in %s, %u of them running\n", f->exams, r.directory, f->running);
     printf("added to the log: %u (%u finished, %u interrupted)\n", f->added, f->finished,
            f->interrupted);
-    printf("result and report made again: %u\n", r.derived);
+    printf("results, reports and worksheets made again: %u\n", r.derived);
     if (f->never_began)
       printf("exams that did not begin, since the disk was full or the program ended: %u\n",
              f->never_began);

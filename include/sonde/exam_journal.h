@@ -22,7 +22,8 @@ typedef enum sonde_note_kind {
   SONDE_NOTE_HINT,      /**< a hint was asked for */
   SONDE_NOTE_MARK,      /**< calipers: from, to */
   SONDE_NOTE_SCORE,     /**< the exam was finished and judged: the entry of the log */
-  SONDE_NOTE_COMMENT    /**< time_s, author, text */
+  SONDE_NOTE_COMMENT,   /**< time_s, author, text */
+  SONDE_NOTE_WORKSHEET  /**< an entry of the worksheet: sonde_worksheet_enter() */
 } sonde_note_kind;
 
 /** A note of a journal. */

@@ -56,6 +56,7 @@
 #include "sonde/trainer_judge.h"
 #include "sonde/trainer_operator.h"
 #include "sonde/trainer_log.h"
+#include "sonde/trainer_worksheet.h"
 #include "sonde/trainer_report.h"
 #include "sonde/dataset.h"
 #include "sonde/stream.h"

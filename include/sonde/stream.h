@@ -16,7 +16,8 @@ typedef struct sonde_page_server sonde_page_server;
 enum {
   SONDE_PAGE_TOKEN = 33,   /**< bytes of a token with its end: 128 bits in hexadecimal */
   SONDE_PAGE_ADDRESS = 64, /**< bytes of a page's address with its end */
-  SONDE_PAGE_LINK = 208    /**< bytes of a link with its end */
+  SONDE_PAGE_LINK = 208,   /**< bytes of a link with its end */
+  SONDE_PAGE_ENTRY = 4097  /**< bytes of an entry with its end */
 };
 
 /** A new token from the kernel's random numbers. @return IO when there are none @thread any */
@@ -37,6 +38,7 @@ typedef enum sonde_page_ask {
   SONDE_PAGE_SEEK,        /**< time_s */
   SONDE_PAGE_PLAY,        /**< playing, speed */
   SONDE_PAGE_COMMENT,     /**< time_s, text, name (author) */
+  SONDE_PAGE_WORKSHEET,   /**< entry */
   SONDE_PAGE_ASKS
 } sonde_page_ask;
 
@@ -46,6 +48,8 @@ typedef struct sonde_page_request {
   char id[64], protocol[64], guidance[16], name[164], text[1604]; /**< UTF-8 */
   double time_s, speed;
   bool playing;
+  /** The whole message: one JSON object of at most 3 levels, of which nothing else was checked. */
+  char entry[SONDE_PAGE_ENTRY];
 } sonde_page_request;
 
 /** Texts (JSON) that each client has in its newest version. */
@@ -54,6 +58,7 @@ typedef enum sonde_page_topic {
   SONDE_PAGE_EXAM,
   SONDE_PAGE_EXAMS,
   SONDE_PAGE_REPLAY,
+  SONDE_PAGE_SHEET,  /**< the worksheet of the exam */
   SONDE_PAGE_STATUS, /**< not sent: GET /status.json */
   SONDE_PAGE_TOPICS
 } sonde_page_topic;
@@ -65,7 +70,7 @@ typedef struct sonde_page_def {
   const char *data_directory;  /**< serve the page from here instead of memory (development) */
   const char *model_path;      /**< for recordings and titles; may be NULL */
   double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */
-  const char *exams_directory; /**< with ID/report.html, exam.json, exam.csv; NULL: none */
+  const char *exams_directory; /**< with ID/report.html, exam.json, ...; NULL: none */
   void *user;                  /**< for the function below, which may be NULL */
   /** A request of the client that controls; a comment or the list of exams, of any. Called by one
    *  thread at a time while the server's clients wait: copy it and return; call nothing of this

@@ -189,9 +189,14 @@ SONDE_API void sonde_score_explain(const sonde_score *score, const sonde_plan *p
 typedef struct sonde_score_note {
   const char *exam, *trainee, *protocol, *guidance, *date;
 } sonde_score_note;
-/** Everything as JSON and the presses as CSV, atomically; either path may be NULL. @thread owner */
+struct sonde_worksheet;
+struct sonde_sheet_verdict;
+/** Everything as JSON and the presses as CSV, atomically; either path may be NULL.
+ *  @param sheet,verdict trainer_worksheet.h; NULL: none was written @thread owner */
 SONDE_API sonde_status sonde_score_save(const sonde_judge *judge, const sonde_case *truth,
                                         const sonde_score *score, const sonde_score_note *note,
+                                        const struct sonde_worksheet *sheet,
+                                        const struct sonde_sheet_verdict *verdict,
                                         const char *json_path, const char *csv_path,
                                         sonde_error *error);
 

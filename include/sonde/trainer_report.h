@@ -9,6 +9,7 @@
 #include "sonde/echo.h"
 #include "sonde/exam_player.h"
 #include "sonde/trainer_log.h"
+#include "sonde/trainer_worksheet.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -54,7 +55,9 @@ typedef struct sonde_exam_report {
   uint32_t earlier_count;
   const sonde_comment *comments; /**< [comment_count] of who watched, by time */
   uint32_t comment_count;
-  const char *recording; /**< file to replay; NULL: none was kept */
+  const char *recording;            /**< file to replay; NULL: none was kept */
+  const sonde_worksheet *worksheet; /**< NULL: none was written */
+  const sonde_sheet_verdict *verdict;
 } sonde_exam_report;
 
 /** Which presses to show: findings, faults and good ones from all along the vein, in the order of

@@ -204,8 +204,9 @@ static void files_say_the_same(void **state) {
   snprintf(truth.title, sizeof truth.title, "A \"quoted\"\ntitle");
   sonde_score score = score_of(judge, &truth);
   sonde_score_note note = {.trainee = "someone", .protocol = "all"};
-  assert_int_equal(sonde_score_save(judge, &truth, &score, &note, "score.json", "score.csv", NULL),
-                   SONDE_OK);
+  assert_int_equal(
+      sonde_score_save(judge, &truth, &score, &note, NULL, NULL, "score.json", "score.csv", NULL),
+      SONDE_OK);
   char *text;
   size_t count;
   assert_int_equal(sonde_file_load("score.json", &text, &count, NULL), SONDE_OK);
@@ -229,7 +230,8 @@ static void files_say_the_same(void **state) {
   assert_int_equal(lines, presses + 1);
   sonde_free(text);
   assert_int_equal(
-      sonde_score_save(judge, &truth, &score, &note, "/nonexistent/x.json", NULL, NULL), SONDE_IO);
+      sonde_score_save(judge, &truth, &score, &note, NULL, NULL, "/nonexistent/x.json", NULL, NULL),
+      SONDE_IO);
   unlink("score.json");
   unlink("score.csv");
   sonde_judge_destroy(judge);

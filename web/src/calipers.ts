@@ -71,6 +71,11 @@ export class Calipers {
     return this.list.map((m) => ({ kind: m.kind, value: sizeOf(m), text: sentence(m) }));
   }
 
+  /** x, depth, x, depth, half of an ellipse's other axis (0: a distance), mm. */
+  get marks(): number[][] {
+    return this.list.map((m) => [...m.ends[0], ...m.ends[1], m.kind === "area" ? m.half_mm : 0].map((v) => Math.round(v * 100) / 100));
+  }
+
   copyFrom(other: Calipers): void {
     this.list = other.list.map((m) => ({ ...m, ends: [[...m.ends[0]], [...m.ends[1]]] }));
     this.count = other.count;

@@ -114,6 +114,9 @@ export class Connection {
   comment(time_s: number, text: string, author: string): void {
     this.send({ type: "comment", time_s, text, author });
   }
+  worksheet(entry: object): void {
+    this.send({ type: "worksheet", ...entry });
+  }
   ack(sequence: number): void {
     this.send({ type: "ack", frame: sequence });
   }

@@ -111,6 +111,11 @@ export class EchoView {
     return [...(this.compared ? this.kept.calipers.measures : []), ...this.live.calipers.measures];
   }
 
+  /** Calipers on the live or frozen image. */
+  get calipers(): number[][] {
+    return this.live.calipers.marks;
+  }
+
   show(frame: Frame): void {
     if (this.frozen) return;
     this.force_n = Math.max(0, frame.snapshot.force_normal_n);

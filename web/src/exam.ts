@@ -11,6 +11,12 @@ export interface ExamActions {
   hint(): void;
   finish(): void;
   leave(): void;
+  /** writes a finding at the station at hand; what the segment is called then, null: there is no worksheet */
+  write(segment: string, decision: Decision): Decision | null;
+  /** a segment was chosen */
+  chosen(segment: string): void;
+  /** what else is still open before the end, in a sentence */
+  gaps(): string;
 }
 
 interface Cell {
@@ -138,8 +144,15 @@ export class ExamBar {
     this.choose(s.id);
   }
 
+  /** From outside: the bar follows. */
+  select(id: string): void {
+    this.chosen = id;
+    if (this.exam) this.mark(this.exam.segments);
+  }
+
   private choose(id: string): void {
     this.chosen = id;
+    this.actions.chosen(id);
     if (this.exam) this.mark(this.exam.segments);
   }
 
@@ -163,8 +176,10 @@ export class ExamBar {
   private decide(decision: Decision): void {
     const now = this.exam?.segments.find((s) => s.id === this.chosen);
     if (!now || !this.controls) return;
-    this.actions.decide(now.id, now.decision === decision ? "" : decision);
-    announce(`${now.title}: ${finding(now.decision === decision ? "" : decision)}`);
+    // At a station of the worksheet the finding is that station's, and the segment's follows.
+    const next = this.actions.write(now.id, decision) ?? (now.decision === decision ? "" : decision);
+    this.actions.decide(now.id, next);
+    announce(`${now.title}: ${finding(next)}`);
   }
 
   key(code: string, shift: boolean): boolean {
@@ -189,7 +204,8 @@ export class ExamBar {
     const row = make("div", "actions");
     const done = button("Finish and see the result", () => (box.close(), this.actions.finish()), "primary");
     row.append(button("Go on", () => box.close()), done);
-    box.replaceChildren(head, make("p", open.length ? "warn" : "", words), row);
+    const gaps = this.actions.gaps();
+    box.replaceChildren(head, make("p", open.length ? "warn" : "", words), ...(gaps ? [make("p", "warn", gaps)] : []), row);
     box.showModal();
     done.focus();
   }

@@ -157,7 +157,7 @@ export class Input {
 
   /** Keys that belong to a field, a focused button, a dialog or the browser. */
   private static taken(e: KeyboardEvent): boolean {
-    const inField = e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement;
+    const inField = e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement || e.target instanceof HTMLTextAreaElement;
     const onButton = e.target instanceof HTMLElement && e.target.closest("button, a, [role=radio]") !== null;
     const ownsKey = onButton && (e.code === "Space" || (e.code === "Enter" && !e.shiftKey));
     const open = document.querySelector("dialog[open]") !== null;

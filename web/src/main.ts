@@ -25,6 +25,7 @@ import { StartDialog } from "./start";
 import { EchoTools } from "./tools";
 import { Traces } from "./traces";
 import { letGo, ROLE_ACTIONS, roleWords } from "./words";
+import { Worksheet, type SheetMessage } from "./worksheet";
 
 const HOME_SITE = 27;
 /** Stations of a limb where an exam begins: the groin, or what a position is for, behind the knee and the calf. */
@@ -63,6 +64,7 @@ class App {
   private readonly tools = new EchoTools(this.echo);
   private readonly patient: PatientTools;
   private readonly examBar: ExamBar;
+  readonly worksheet: Worksheet;
   private readonly replayBar: ReplayBar;
   private readonly start: StartDialog;
   private readonly result: ResultDialog;
@@ -91,9 +93,20 @@ class App {
     this.patient = new PatientTools(connection);
     this.examBar = new ExamBar({
       decide: (segment, decision) => connection.decide(segment, decision),
+      write: (segment, decision) => this.worksheet.write(segment, decision),
+      chosen: (segment) => this.worksheet.chosen(segment),
+      gaps: () => this.worksheet.gaps(),
       hint: () => connection.hint(),
       finish: () => connection.finishExam(),
       leave: () => connection.leaveExam(),
+    });
+    this.worksheet = new Worksheet({
+      enter: (entry) => connection.worksheet(entry),
+      decide: (segment, decision) => connection.decide(segment, decision),
+      choose: (segment) => this.examBar.select(segment),
+      marks: () => this.echo.calipers,
+      learner: () => this.hello?.trainee ?? "",
+      protocol: (id) => this.hello?.protocols?.find((p) => p.id === id)?.title ?? id,
     });
     this.replayBar = new ReplayBar({
       seek: (time_s) => connection.seek(time_s),
@@ -108,6 +121,7 @@ class App {
       next: (id) => (this.result.hide(), connection.leaveExam(), this.start.open(this.start.next(id))),
       close: () => connection.leaveExam(),
       comment: () => this.replayBar.write(),
+      worksheet: () => this.worksheet.summary(),
     });
     this.history = new HistoryDialog((exam) => connection.openReplay(exam));
     this.input = this.wireInput();
@@ -165,6 +179,7 @@ class App {
     if (code === "KeyI") this.rates.toggle();
     else if (code === "Digit0" && this.hands) this.setDepth(EASED_MM);
     else if (this.phase === "replay" && this.controls?.controls && this.replayBar.key(code, shift)) return true;
+    else if (this.worksheet.key(code, shift)) return true;
     else return this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
     return true;
   }
@@ -177,6 +192,7 @@ class App {
     else if (message.type === "exam") this.setExam(message);
     else if (message.type === "exams") this.history.fill(message.list);
     else if (message.type === "replay") this.setReplay(message);
+    else if (message.type === "worksheet") this.setSheet(message);
     else if (message.type === "error") this.say(message.message);
   }
 
@@ -257,6 +273,7 @@ class App {
     if (exam.phase === "practice" && exam.message && before !== "practice") this.say(exam.message, 8000);
     if (exam.phase === "running" || exam.phase === "done") this.examBar.show(exam, this.controls?.controls ?? false);
     this.patient.turns(exam);
+    this.worksheet.show(exam, this.controls?.controls ?? false);
     if (exam.phase === "done") this.result.show(exam, this.controls?.controls ?? false, this.comments);
     else this.result.hide();
     if (exam.phase !== "replay") this.replayBar.leave();
@@ -290,6 +307,11 @@ class App {
     const away = exam.step.offset_mm === null || reached ? "" : `${exam.step.offset_mm.toFixed(0)} mm away`;
     if (target) name.textContent = away ? `${target.name}, ${away}` : target.name;
     name.classList.toggle("reached", reached);
+  }
+
+  private setSheet(sheet: SheetMessage): void {
+    this.worksheet.set(sheet);
+    if (this.exam) this.setExam(this.exam);
   }
 
   private setReplay(replay: Replay): void {
@@ -541,6 +563,7 @@ class App {
     this.pixels = frame.pixels;
     this.scene.show(frame);
     this.echo.show(frame);
+    this.worksheet.see(s.tick, this.echo.isFrozen);
     this.readouts.show(s);
     const running = this.phase === "running";
     this.examBar.tell(this.forceBar.show(s, running ? (this.exam?.compression ?? null) : null));
@@ -601,6 +624,7 @@ const sonde = {
   get hello() { return app.hello; },
   get exam() { return app.exam; },
   get replay() { return app.replay; },
+  get worksheet() { return app.worksheet.written; },
   get frames() { return app.frames; },
   /** changes whenever the echo image changes */
   get imageSum() { return app.pixels.reduce((sum, p, i) => (sum + p * ((i % 251) + 1)) % 1e9, 0); },

@@ -169,6 +169,7 @@ const KEYS: [string, string][] = [
   ["P, V, Z", "patient's position, strain, gel (Shift + Z wipes)"],
   [", and .", "segment before, next segment"],
   ["J, K, L", "finding: compressible, clot, not seen"],
+  ["N, [ and ], Shift + N", "store this image at the station, station before or next, worksheet"],
   ["U, Shift + Enter", "hint, finish the exam"],
   ["Replay: Space, Left / Right", "play or pause, 1 s back or on (Shift: 5 s)"],
   ["I, Esc", "latency and frame rate; emergency stop (Resume goes on)"],

@@ -1,5 +1,7 @@
 // Messages of docs/page_protocol.md: types, decoding of the binary ones. Lengths are mm.
 
+import type { SheetMessage } from "./worksheet";
+
 export type Vec3 = [number, number, number];
 /** w, x, y, z */
 export type Quat = [number, number, number, number];
@@ -113,6 +115,8 @@ export type Phase = "practice" | "preparing" | "running" | "done" | "replay";
 
 export interface Target {
   name: string;
+  /** its number in the worksheet, from 0 */
+  place?: number;
   position_mm: Vec3;
   normal: Vec3;
   across: Vec3;
@@ -242,6 +246,7 @@ export type TextMessage =
   | Controls
   | Exam
   | Replay
+  | SheetMessage
   | { type: "exams"; list: ExamEntry[] }
   | { type: "error"; message: string }
   | { type: "pong"; id: number };

@@ -11,6 +11,8 @@ export interface ResultActions {
   next(caseId: string): void;
   close(): void;
   comment(): void;
+  /** of the worksheet; null: none was written */
+  worksheet(): HTMLElement | null;
 }
 
 function ring(result: Result): HTMLElement {
@@ -89,7 +91,7 @@ export class ResultDialog {
   /** `comments`: who sees it may comment on the exam. */
   show(exam: Exam, controls: boolean, comments: boolean): void {
     const result = exam.result;
-    const key = `${exam.exam} ${controls} ${comments}`;
+    const key = `${exam.exam} ${controls} ${comments} ${this.actions.worksheet() !== null}`;
     if (!result || key === this.shown) return;
     this.shown = key;
     const head = make("h2", result.passed ? "good" : "bad", result.passed ? "Passed" : "Not passed");
@@ -101,6 +103,8 @@ export class ResultDialog {
     const body: HTMLElement[] = [top, this.diagnosis(result)];
     if (result.note) body.push(make("p", "note", result.note));
     if (result.parts) body.push(parts(result.parts));
+    const sheet = this.actions.worksheet();
+    if (sheet) body.push(sheet);
     this.box.replaceChildren(...body, segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls, comments));
     if (!this.box.open) this.box.showModal();
     this.box.querySelector<HTMLElement>("a.primary")?.focus();

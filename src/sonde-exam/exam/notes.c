@@ -49,7 +49,7 @@ const sonde_note *sonde_notes_last(const sonde_notes *notes, sonde_note_kind kin
 
 sonde_status sonde_notes_add(const char *path, sonde_note_kind kind, const char *text,
                              sonde_error *error) {
-  SONDE_ASSERT(path && text && kind >= SONDE_NOTE_SETUP && kind <= SONDE_NOTE_COMMENT);
+  SONDE_ASSERT(path && text && kind >= SONDE_NOTE_SETUP && kind <= SONDE_NOTE_WORKSHEET);
   sonde_journal *journal;
   sonde_recording recording;
   if (strlen(text) >= SONDE_NOTE_MOST_BYTES)

@@ -131,7 +131,7 @@ void sonde_session_drain(sonde_session *session) {
 
 sonde_status sonde_session_note(sonde_session *session, sonde_note_kind kind, uint64_t tick,
                                 const char *text, sonde_error *error) {
-  SONDE_ASSERT(session && text && kind >= SONDE_NOTE_SETUP && kind <= SONDE_NOTE_COMMENT);
+  SONDE_ASSERT(session && text && kind >= SONDE_NOTE_SETUP && kind <= SONDE_NOTE_WORKSHEET);
   if (!session->recorder) return SONDE_OK;
   size_t bytes = strlen(text) + 1;
   if (bytes > SONDE_NOTE_MOST_BYTES)

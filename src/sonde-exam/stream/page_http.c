@@ -119,19 +119,23 @@ static void send_stranger(page_out *out) {
 
 // A report is drawn by its own script, in an origin of its own: it cannot act on the page's behalf.
 static const char REPORT_POLICY[] =
-    "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
+    "sandbox allow-scripts allow-downloads allow-modals; default-src 'none'; script-src "
+    "'unsafe-inline'; "
     "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'";
 
 typedef struct exam_document {
-  const char *prefix, *suffix; // of the address, around the exam's id
-  const char *name, *type, *policy;
+  const char *prefix, *suffix;      // of the address, around the exam's id
+  const char *name, *type, *policy; // name: of the file; before a number, its beginning
 } exam_document;
 
 static const exam_document DOCUMENTS[] = {
     {"/report/", "", "report.html", "text/html; charset=utf-8", REPORT_POLICY},
     {"/exam/", ".json", "exam.json", "application/json", NULL},
     {"/exam/", ".csv", "exam.csv", "text/csv; charset=utf-8", NULL},
+    {"/worksheet/", ".json", "worksheet.json", "application/json", NULL},
+    {"/worksheet/", ".csv", "worksheet.csv", "text/csv; charset=utf-8", NULL},
+    {"/worksheet/", ".png", "worksheet-", "image/png", NULL}, // ID/NUMBER
 };
 
 // False when the address is not one of an exam.
@@ -142,12 +146,22 @@ static bool answer_document(const sonde_page_server *server, const page_request 
   for (size_t i = 0; server->exams_directory[0] && i < SONDE_COUNT_OF(DOCUMENTS); ++i) {
     // An id is lower-case letters, digits and '-', so that it names one directory and nothing else.
     const exam_document *d = &DOCUMENTS[i];
-    char id[64], given[64], key[PAGE_SECRET_TEXT];
+    char id[64], given[64], key[PAGE_SECRET_TEXT], name[40];
     size_t prefix = strlen(d->prefix), suffix = strlen(d->suffix);
     if (all <= prefix + suffix || all - prefix - suffix >= sizeof id) continue;
     if (strncmp(uri, d->prefix, prefix) || strcmp(uri + all - suffix, d->suffix)) continue;
     snprintf(id, sizeof id, "%.*s", (int)(all - prefix - suffix), uri + prefix);
-    if (id[strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-")]) continue;
+    snprintf(name, sizeof name, "%s", d->name);
+    char *number = strchr(id, '/');
+    const bool numbered = d->name[strlen(d->name) - 1] == '-';
+    if (numbered != (number != NULL)) continue;
+    if (number) { // at most six digits
+      *number++ = 0;
+      const size_t digits = strspn(number, "0123456789");
+      if (digits == 0 || digits > 6 || number[digits]) continue;
+      snprintf(name, sizeof name, "%s%s%s", d->name, number, d->suffix);
+    }
+    if (!id[0] || id[strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-")]) continue;
     // The address of a document says its own key, so that it opens in another tab and opens nothing
     // else.
     bool known = knows_token(server, request);
@@ -157,7 +171,7 @@ static bool answer_document(const sonde_page_server *server, const page_request 
     }
     char path[640], *bytes = NULL;
     page_body body = {.type = d->type, .policy = d->policy};
-    snprintf(path, sizeof path, "%s/%s/%s", server->exams_directory, id, d->name);
+    snprintf(path, sizeof path, "%s/%s/%s", server->exams_directory, id, name);
     if (!known) {
       send_stranger(out);
     } else if (sonde_file_load(path, &bytes, &body.size, NULL)) {

@@ -167,7 +167,7 @@ static void read_request(reader *r, sonde_page_ask ask, sonde_page_request *q) {
 static const char *const TYPES[] = {
     "goal",       "controls",    "stop",   "resume", "ack",      "ping",        "gel",
     "role",       "start_exam",  "decide", "hint",   "position", "finish_exam", "leave_exam",
-    "list_exams", "open_replay", "seek",   "play",   "comment"};
+    "list_exams", "open_replay", "seek",   "play",   "comment",  "worksheet"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
 sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,
@@ -202,6 +202,10 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
     switch (command->type) {
     case PAGE_COMMAND_REQUEST:
       read_request(&r, (sonde_page_ask)(which - PAGE_COMMAND_REQUEST), &command->request);
+      // What its members mean is the worksheet's to say, which reads them from a journal too.
+      _Static_assert((int)SONDE_PAGE_ENTRY > (int)PAGE_COMMAND_BYTES, "room for its end");
+      if (command->request.ask == SONDE_PAGE_WORKSHEET)
+        memcpy(command->request.entry, bytes, count);
       break;
     case PAGE_COMMAND_GOAL:
       read_vector(&r, "position_mm", 3, REACH_MM, p);

@@ -102,8 +102,8 @@ sonde_status sonde_exam_run(const sonde_exam_def *def, const sonde_exam_setups *
         .trainee = def->operator_name, .protocol = def->protocol->id, .guidance = "exam"};
     sonde_judge_score(e.judge, def->patient, score);
     SONDE_ASSERT(score->score >= 0 && score->score <= 100 + 1e-9);
-    status =
-        sonde_score_save(e.judge, def->patient, score, &note, def->json_path, def->csv_path, error);
+    status = sonde_score_save(e.judge, def->patient, score, &note, NULL, NULL, def->json_path,
+                              def->csv_path, error);
   }
   sonde_bench_close(&e.bench);
   if (e.hand.destroy) e.hand.destroy(e.hand.self);

@@ -234,6 +234,9 @@ sonde_status sonde_exam_report_json(const sonde_exam_report *exam, char **text, 
   put_vein(&out, exam);
   put_traces(&out, exam);
   status = sonde_put_pictures(&out, exam, error);
+  if (!status && exam->worksheet)
+    status = sonde_worksheet_put(&out, "worksheet", exam->worksheet, exam->plan, exam->map,
+                                 exam->verdict, true, error);
   if (!status) status = put_history(&out, exam, error);
   if (status) {
     sonde_file_discard(out.file);

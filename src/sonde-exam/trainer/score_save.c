@@ -149,8 +149,9 @@ void sonde_put_result(sonde_json_out *out, const sonde_exam_report *exam) {
 
 sonde_status sonde_score_save(const sonde_judge *judge, const sonde_case *truth,
                               const sonde_score *score, const sonde_score_note *note,
+                              const sonde_worksheet *sheet, const sonde_sheet_verdict *verdict,
                               const char *json_path, const char *csv_path, sonde_error *error) {
-  SONDE_ASSERT(judge && truth && score && note);
+  SONDE_ASSERT(judge && truth && score && note && (!sheet || verdict));
   sonde_status status = SONDE_OK;
   if (json_path) {
     sonde_json_out out = {.layout = SONDE_JSON_LINES};
@@ -166,6 +167,9 @@ sonde_status sonde_score_save(const sonde_judge *judge, const sonde_case *truth,
     sonde_json_begin_object(&out, NULL);
     sonde_json_put_integer(&out, "sonde_exam", 1);
     sonde_put_result(&out, &exam);
+    if (sheet)
+      (void)sonde_worksheet_put(&out, "worksheet", sheet, &judge->plan, &judge->first, verdict,
+                                false, NULL);
     sonde_json_end(&out);
     sonde_file_printf(out.file, "\n");
     status = sonde_file_commit(out.file, error);

@@ -7,6 +7,7 @@ import { drawScores, drawTraces, drawVein, pressMark } from "./exam_drawings";
 import { type Advice, toWorkOn, wentWell } from "./exam_words";
 import { fixed, isKnown, type Real } from "./number";
 import { type Cell, columns, table } from "./table";
+import { drawSheet, type SheetPicture } from "./worksheet";
 
 const LISTED = 9; // exams in the table of earlier ones
 const SHORT = 24; // a list of presses that stands open
@@ -165,6 +166,22 @@ function pictures(data: Exam): HTMLElement | null {
     h("div", { class: "pictures" }, ...pairs));
 }
 
+/** What the learner wrote, beside the truth; it prints alone too. */
+function worksheet(data: Exam): HTMLElement | null {
+  const sheet = data.worksheet;
+  if (!sheet) return null;
+  const source = (p: SheetPicture): string => (p.image ? `data:image/png;base64,${p.image}` : "");
+  const print = h("button", { type: "button", class: "save alone" }, "Print the worksheet alone");
+  print.onclick = () => {
+    document.body.classList.add("sheet-alone");
+    window.print();
+    document.body.classList.remove("sheet-alone");
+  };
+  const { exam: e, patient, protocol } = data;
+  return section("worksheet", "Your worksheet", h("p", {}, print),
+    drawSheet(sheet, [["Patient", e.title], ["Protocol", protocol?.title ?? e.protocol], ["Examiner", e.trainee], ["Date", e.date && dateInWords(e.date)], ["Exam", e.exam], ["Question", patient.history]], source));
+}
+
 const traces = (data: Exam): HTMLElement | null =>
   data.traces.time_s.length < 2 ? null : section("traces", "Force and vein over time",
     figure(drawTraces(data), "traces", "Force of the probe and area of the vein over time",
@@ -250,8 +267,9 @@ export function exam(report: unknown): void {
   const data = report as Exam;
   document.body.classList.add("exam");
   const sections = [question(data), advice(data), data.patient.note ? section("case", "About this case", h("p", { class: "text" }, data.patient.note)) : null, comments(data),
-    score(data), along(data), pictures(data), traces(data), earlier(data), measures(data), presses(data)];
+    score(data), worksheet(data), along(data), pictures(data), traces(data), earlier(data), measures(data), presses(data)];
   document.body.append(head(data), h("main", {}, ...sections), foot(data));
+  if (location.hash === "#worksheet-alone") document.body.classList.add("sheet-alone");
   // A link to a press opens the list that holds it.
   document.body.addEventListener("click", (event) => {
     const link = (event.target as Element).closest("a[href^='#press-']");

@@ -1,6 +1,7 @@
 // What the report of an exam holds: written by src/sonde-exam/trainer/report.c and score_save.c.
 
 import type { Real } from "./number";
+import type { Sheet } from "./worksheet";
 
 export type Result = "complete" | "open" | "insufficient" | "too_hard" | "off_axis";
 export type Decision = "" | "compressible" | "clot" | "not_seen";
@@ -85,6 +86,7 @@ export interface Exam {
   traces: { time_s: number[]; force_n: Real[]; vein: Real[] };
   exams: Entry[];
   curve: { number: number; score: number; median: number; passed: boolean }[];
+  worksheet?: Sheet;
 }
 
 // ---- words and marks
