@@ -47,9 +47,9 @@ holds "$status" = 1
 holds -z "$(ls one/index one/*.tar one/*.part-* 2>/dev/null | grep -v '^one/index:$' || true)"
 expect 0 '2 of 2 legs \(2 made now\)' dataset --plan plan.yaml -o one
 
-# A shard that was killed, with a leg cut short and a file left aside, and a leg that another made.
+# A shard that was killed, with a leg cut short behind its index and a file left aside, and a leg that another made.
 cp -r one two
-rm two/index/leg-000001.json two/manifest.json two/SHA256SUMS two/README.md two/card.json
+rm two/manifest.json two/SHA256SUMS two/README.md two/card.json
 head -c 1000 one/leg-000001.tar >two/leg-000001.tar
 cp two/leg-000001.tar two/leg-000001.tar.part-00abcd
 expect 0 '1 of 2 legs \(0 made now\)' dataset --plan two/plan.yaml --shard 1/2 -o two
