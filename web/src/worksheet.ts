@@ -65,6 +65,7 @@ export class Worksheet {
   private readonly ends = make("div");
   private readonly chips = make("div");
   private readonly impression = make("textarea");
+  private painted = ""; // what the paper shows
   private timers = new Map<string, number>();
 
   constructor(private readonly actions: SheetActions) {
@@ -389,7 +390,7 @@ export class Worksheet {
     }
     this.impression.disabled = !this.controls;
     if (document.activeElement !== this.impression) this.impression.value = sheet.text;
-    if (this.dialog.open) this.preview();
+    if (this.dialog.open) this.paint();
   }
 
   private mark(row: Row, i: number): void {
@@ -432,12 +433,19 @@ export class Worksheet {
     if (!this.sheet) return;
     const row = make("div", "actions");
     row.append(button("Print, or save as PDF", () => window.print(), "primary"), button("Save as JSON", () => this.save()), make("span", "spring"), button("Close", () => this.dialog.close()));
-    const top = this.dialog.querySelector(".paper")?.scrollTop ?? 0;
-    const paper = make("div", "paper");
-    paper.append(this.draw());
-    this.dialog.replaceChildren(paper, row);
+    this.dialog.replaceChildren(make("div", "paper"), row);
+    this.painted = "";
     if (!this.dialog.open) this.dialog.showModal();
-    paper.scrollTop = top;
+    this.paint();
+  }
+
+  /** The paper is drawn anew only when it says something else: who reads and clicks is not disturbed. */
+  private paint(): void {
+    const key = `${JSON.stringify(this.sheet)}${[...this.pixels.values()].filter(Boolean).length}`;
+    const paper = this.dialog.querySelector(".paper");
+    if (!paper || key === this.painted) return;
+    this.painted = key;
+    paper.replaceChildren(this.draw());
   }
 
   /** The browser prints the worksheet of the exam, whatever is on the screen. */
