@@ -7,7 +7,7 @@ import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, turnAcross, turnPatient } from "./drive.mjs";
-import { FEW_IMAGES, startRun } from "./program.mjs";
+import { FEW_IMAGES, onePlace, startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
 if (!browserPath) {
@@ -24,7 +24,7 @@ const check = (condition, what) => {
   console.log(`ok ${what}`);
 };
 
-const start = (port) => startRun(sonde, ["--port", String(port), "--exams", exams, ...FEW_IMAGES]);
+const start = (port, more = []) => startRun(sonde, ["--port", String(port), "--exams", exams, ...FEW_IMAGES, ...more]);
 
 const state = (page) => page.evaluate(() => ({ exam: window.sonde.exam, replay: window.sonde.replay, snapshot: window.sonde.snapshot, sum: window.sonde.imageSum }));
 const until = (page, condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });
@@ -151,7 +151,9 @@ async function replay(page, exam) {
   await until(page, () => window.sonde.exam.phase === "practice");
 }
 
-async function killed(browser, running) {
+async function killed(browser, port) {
+  const place = onePlace(); // what is killed is an exam, however many places it has
+  const running = await start(port, place);
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
   page.setDefaultTimeout(PATIENCE_MS);
   await page.goto(addressOf(running.learner, "?quality=low"));
@@ -160,7 +162,7 @@ async function killed(browser, running) {
   await page.evaluate(() => window.sonde.setDepth(10));
   await page.waitForTimeout(2500);
   running.child.kill("SIGKILL");
-  const again = await start(running.learner.port);
+  const again = await start(port, place);
   await until(page, () => window.sonde.connected && window.sonde.exam?.phase === "practice");
   check(again.learner.token === running.learner.token, "the token outlives the program, and the page finds it again");
   const file = statSync(join(exams, "page.token"));
@@ -191,7 +193,9 @@ async function main() {
   await replay(page, exam);
   check(errors.length === 0, `no console error ${errors.join("; ")}`);
   await page.close();
-  running = await killed(browser, running);
+  running.interrupt();
+  await running.ended;
+  running = await killed(browser, running.learner.port);
   await browser.close();
   running.interrupt();
   await running.ended;
