@@ -11,13 +11,7 @@
 #include <time.h>
 
 // Of the palette: greys, then colours from the fastest away to the fastest towards the probe.
-enum {
-  GREYS = 128,
-  COLOURS = 127,
-  FRAMES = 5,
-  BAR = 10,
-  GREY_LIMIT = 110
-}; // no colour on brighter pixels
+enum { GREYS = 128, COLOURS = 127, FRAMES = 5, BAR = 10 };
 
 static void make_palette(bool power, uint8_t palette[GREYS + COLOURS][3]) {
   for (int k = 0; k < GREYS; ++k)
@@ -39,41 +33,19 @@ static void make_palette(bool power, uint8_t palette[GREYS + COLOURS][3]) {
   }
 }
 
-// The frame of colour in a picture: bilinear between cells, the autocorrelation's velocity as a
-// phase, so that folds stay sharp. Colour has priority where the picture is dark.
-static void paint(const image_colour *of, const sonde_colour_box *box, double limit,
-                  const sonde_colour_value *value, const sonde_image *image, uint8_t *pixels) {
-  static float phase[SONDE_COLOUR_CELLS][2]; // of a cell's velocity, times its power
-  for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) {
-    const float angle = (float)(M_PI / limit) * value[i].velocity_m_s;
-    phase[i][0] = phase[i][1] = 0;
-    if (value[i].power > 1)
-      phase[i][0] = value[i].power * cosf(angle), phase[i][1] = value[i].power * sinf(angle);
-  }
-  const double size = image->width_m / image->width;
-  for (uint32_t y = 0; y < image->height; ++y)
-    for (uint32_t x = 0; x < image->width; ++x) {
-      const size_t at = (size_t)y * image->width + x;
-      double place[2], re = 0, im = 0, power = 0;
-      pixels[at] = (uint8_t)(image->pixels[at] * (GREYS - 1) / 255);
-      if (image->pixels[at] > GREY_LIMIT ||
-          !sonde_colour_find(box, (x + 0.5 - 0.5 * image->width) * size, (y + 0.5) * size, place))
-        continue;
-      const int line = (int)fmin(place[0], SONDE_COLOUR_LINES - 2),
-                row = (int)fmin(place[1], SONDE_COLOUR_ROWS - 2);
-      for (int k = 0; k < 4; ++k) {
-        const int cell = (row + k / 2) * SONDE_COLOUR_LINES + line + k % 2;
-        const double a = place[0] - line, b = place[1] - row;
-        const double w = (k % 2 ? a : 1 - a) * (k / 2 ? b : 1 - b);
-        re += w * (double)phase[cell][0], im += w * (double)phase[cell][1];
-        power += w * (double)value[cell].power;
-      }
-      if (!(power > (double)SONDE_COLOUR_POWER)) continue;
-      // Power is shown over 25 dB from the least on.
-      const double shown = of->power
-                               ? fmin(log10(power / (double)SONDE_COLOUR_POWER) / 1.25, 1) * 2 - 1
-                               : atan2(im, re) / M_PI;
-      pixels[at] = (uint8_t)(GREYS + lround((shown + 1) / 2 * (COLOURS - 1)));
+// The frame of colour in a picture.
+static void paint(const image_colour *of, const sonde_colour_box *box, sonde_colour *colour,
+                  const sonde_image *image, uint8_t *scratch, uint8_t *pixels) {
+  sonde_colour_overlay over = {.pixels = scratch};
+  sonde_colour_paint(colour, box, 0, of->power, image, &over);
+  for (size_t i = 0; i < (size_t)image->width * image->height; ++i)
+    pixels[i] = (uint8_t)(image->pixels[i] * (GREYS - 1) / 255);
+  for (uint32_t y = 0; y < over.height; ++y)
+    for (uint32_t x = 0; x < over.width; ++x) {
+      const uint8_t shown = over.pixels[(size_t)y * over.width + x];
+      if (shown)
+        pixels[(size_t)(over.top + y) * image->width + over.left + x] =
+            (uint8_t)(GREYS + (shown - 1) * (COLOURS - 1) / 254);
     }
 }
 
@@ -172,7 +144,9 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
   if (!status) sonde_flow_scene_run(scene, &flow, of->at_s);
   sonde_colour_cell *cells = calloc(SONDE_COLOUR_CELLS, sizeof *cells);
   uint8_t *pixels = malloc((size_t)image->width * image->height);
-  if (!status && !(cells && pixels)) status = app_error(error, SONDE_MEMORY, "out of memory");
+  uint8_t *scratch = malloc((size_t)image->width * image->height);
+  if (!status && !(cells && pixels && scratch))
+    status = app_error(error, SONDE_MEMORY, "out of memory");
   const double margin = 1e-3;
   const bool given = !isnan(of->box_m[0]);
   sonde_colour_box box = {
@@ -210,8 +184,8 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
     for (int k = 0; k <= FRAMES; ++k) {
       if (k == 1) from = clock();
       sonde_flow_scene_cells(scene, echo, &box, cells);
-      value = sonde_colour_frame(colour, cells, 0);
-      paint(of, &box, result->limit_m_s, value, image, pixels);
+      value = sonde_colour_frame(colour, cells);
+      paint(of, &box, colour, image, scratch, pixels);
     }
     result->frame_s = (double)(clock() - from) / CLOCKS_PER_SEC / FRAMES;
     compare(cells, value, result);
@@ -225,7 +199,7 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
       result->mean_m_s[v] = sonde_flow_scene_velocity(scene, v, s->pose);
     if (!status && of->cells) status = write_cells(of->cells, s, &box, cells, value, error);
   }
-  free(cells), free(pixels);
+  free(cells), free(pixels), free(scratch);
   sonde_colour_destroy(colour);
   sonde_flow_scene_destroy(scene);
   return status;

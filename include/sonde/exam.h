@@ -7,6 +7,7 @@
 
 #include "sonde/exam_journal.h"
 #include "sonde/echo.h"
+#include "sonde/flow_colour.h"
 #include "sonde/haptics_render.h"
 #include "sonde/identify.h"
 #include "sonde/interior_findings.h"
@@ -14,6 +15,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/** What Doppler lays over the image: velocity along the beam, or how much moves. */
+typedef enum sonde_duplex_shown {
+  SONDE_DUPLEX_OFF,
+  SONDE_DUPLEX_VELOCITY,
+  SONDE_DUPLEX_POWER
+} sonde_duplex_shown;
+
+/** The scanner's Doppler, on flat faces; numbers out of range are clamped. */
+typedef struct sonde_duplex_controls {
+  sonde_duplex_shown shown;
+  sonde_colour_box box; /**< cut to the image; sides lean by up to 20 degrees */
+  double scale_m_s;     /**< velocity along the beam from which colour folds, 0.01 to 1; less where
+                             the pulses' way to the box and back takes longer */
+  double gain_db;       /**< -30 to 20 */
+} sonde_duplex_controls;
+/** Off; a box of 28 mm by 30 mm, 6 cm/s, 0 dB. @thread any */
+SONDE_API sonde_duplex_controls sonde_duplex_controls_default(void);
 
 /** What changes a session besides the probe's pose; applied at the start of a tick. */
 typedef struct sonde_session_controls {
@@ -29,6 +48,10 @@ typedef struct sonde_session_controls {
   // the patient, of a session with def.circulate
   sonde_posture posture;
   bool valsalva; /**< strains as long as it is set */
+  // blood: the free hand, a deep breath, and what the scanner shows of it
+  uint32_t squeeze;     /**< counts: each step squeezes the calf for 1.5 s */
+  uint32_t deep_breath; /**< counts: each step is one deep breath in and out, 5 s */
+  sonde_duplex_controls duplex;
   // the practitioner's bench
   uint32_t preset;        /**< index into the session's presets */
   double stiffness_scale; /**< of every spring of that preset, 0.5 to 2 */
@@ -159,6 +182,14 @@ SONDE_API sonde_session_controls sonde_session_controls_now(const sonde_session 
 /** For sonde_device_page_goal(). @thread any */
 SONDE_API sonde_device *sonde_session_device(sonde_session *session);
 
+/** Colour over a frame's image. */
+typedef struct sonde_frame_colour {
+  sonde_duplex_shown shown;  /**< OFF: none, nothing else is set */
+  sonde_colour_box box;      /**< as it was drawn */
+  double limit_m_s;          /**< velocity along the beam from which it folds */
+  sonde_colour_overlay over; /**< its pixels belong to the frame */
+} sonde_frame_colour;
+
 /** Newest finished frame: snapshot, skin and image of one and the same tick. */
 struct sonde_frame {
   sonde_snapshot snapshot;
@@ -166,6 +197,7 @@ struct sonde_frame {
   const uint8_t *pixels; /**< [height*width] */
   uint32_t width, height;
   double width_m, height_m;
+  sonde_frame_colour colour;
 };
 /** Newest frame since the last call, false when nothing is new; the pointers stay valid until the
  *  next call. @thread any, one reader */

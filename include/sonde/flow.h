@@ -59,8 +59,10 @@ typedef struct sonde_flow_def {
   double inflow_m3_s; /**< through the common femoral artery at rest, > 0; default 350 ml/min */
   double heart_rate_hz, breath_rate_hz; /**< default 1.15, 0.25 */
   double breath_pa;                     /**< swing of the pressure in the belly; default 47 */
+  double deep_breath_from_s;            /**< a deep breath in and out in 5 s; default never */
   double squeeze_from_s, squeeze_pa;    /**< a hand on the calf for 1.5 s; default never */
-  double valsalva_from_s, valsalva_to_s, valsalva_pa; /**< default never; 4000 Pa */
+  double valsalva_from_s, valsalva_to_s, valsalva_pa; /**< default never; 4000 Pa.
+                                                                   From -INFINITY on: always */
 } sonde_flow_def;
 
 /** Typical veins, or those of a limb when it is not NULL: lengths, areas and companions of its
@@ -90,6 +92,9 @@ typedef struct sonde_flow {
  */
 SONDE_API sonde_status sonde_flow_start(const sonde_flow_def *def, sonde_flow *flow,
                                         sonde_error *error);
+/** The steady state of a network that was started, with what its definition says now of clots and
+ *  columns, and valves open. @thread any (tick) */
+SONDE_API void sonde_flow_settle(sonde_flow *flow);
 /** One implicit step of dt_s (1e-5 to 1e-2). About a microsecond. @thread any (tick) */
 SONDE_API void sonde_flow_step(sonde_flow *flow, double dt_s);
 /** Blood through one of the veins of a segment, m3/s: conductances add up. @thread any (tick) */

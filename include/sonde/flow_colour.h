@@ -40,6 +40,7 @@ typedef struct sonde_colour_cell {
   float towards_m_s; /**< along the beam, towards the probe */
   float across_m_s;  /**< across it */
   uint32_t vessel;   /**< whose blood it is, or SONDE_COLOUR_NO_VESSEL: tissue */
+  float loss_db;     /**< of its echo, more than what the compensation makes up for: in a shadow */
 } sonde_colour_cell;
 
 /** The chain behind the colour. */
@@ -62,6 +63,12 @@ typedef struct sonde_colour sonde_colour;
 SONDE_API sonde_status sonde_colour_create(const sonde_colour_def *def, sonde_colour **colour,
                                            sonde_error *error);
 SONDE_API void sonde_colour_destroy(sonde_colour *colour); /**< NULL is fine. @thread owner */
+/** Other numbers from the next frame on, but for the seed; without allocation.
+ *  @return false when one is out of range: then nothing changed @thread tick */
+SONDE_API bool sonde_colour_tune(sonde_colour *colour, const sonde_colour_def *def);
+/** The number of the next frame, which chooses its random numbers; frames count from 0 by
+ *  themselves. @param holds whether it keeps its share of the frame before @thread tick */
+SONDE_API void sonde_colour_next(sonde_colour *colour, uint64_t number, bool holds);
 
 /** What the estimate holds of a cell. */
 typedef struct sonde_colour_value {
@@ -75,13 +82,32 @@ typedef struct sonde_colour_value {
  * A packet of pulses on every cell: blood that moves and loses its pattern with the beam's passage,
  * mixed over neighbours by the beam, tissue, noise; wall filter, lag-one autocorrelation, averages
  * over 3 x 3 cells, persistence.
- * @param cells [SONDE_COLOUR_CELLS] row by row; lines beside each other
- * @param tissue_m_s motion of the tissue towards the probe
+ * @param cells [SONDE_COLOUR_CELLS] row by row; lines beside each other; tissue that moves shows,
+ *   too
  * @return [SONDE_COLOUR_CELLS] owned by the colour, until the next frame
  * @thread tick
  */
-SONDE_API const sonde_colour_value *
-sonde_colour_frame(sonde_colour *colour, const sonde_colour_cell *cells, double tissue_m_s);
+SONDE_API const sonde_colour_value *sonde_colour_frame(sonde_colour *colour,
+                                                       const sonde_colour_cell *cells);
+
+/** Colour over a rectangle of an image's pixels. */
+typedef struct sonde_colour_overlay {
+  uint32_t left, top, width, height; /**< of the pixels that hold the box */
+  uint8_t *pixels; /**< [height * width]; 0: none. Velocity from the limit away (1) over 0 (128) to
+                        the limit towards the probe (255); power from the least that is shown (1)
+                        over 25 dB */
+} sonde_colour_overlay;
+/**
+ * The last frame over the picture of a flat face: bilinear between cells, velocities as phases, so
+ * that folds stay sharp. Where the picture is brighter than 110 of 255 it has priority.
+ * @param gain_db of the power before the threshold SONDE_COLOUR_POWER
+ * @param power how much moves instead of how fast
+ * @param[in,out] overlay pixels with room for all of the image; the rest is set
+ * @thread tick
+ */
+SONDE_API void sonde_colour_paint(sonde_colour *colour, const sonde_colour_box *box, double gain_db,
+                                  bool power, const sonde_image *image,
+                                  sonde_colour_overlay *overlay);
 
 /* ---- vessels of a pressed model ----------------------------------------------------------- */
 
@@ -96,9 +122,20 @@ SONDE_API void sonde_flow_scene_destroy(sonde_flow_scene *scene); /**< @thread o
 /** Sets what is closed of the veins of a definition to what probe and clots leave of the sections
  *  now: the share that gives the vein's whole length its resistance. @thread owner */
 SONDE_API void sonde_flow_scene_narrow(const sonde_flow_scene *scene, sonde_flow_def *def);
-/** Runs a network, started or not, to a time and takes flows and profiles; arteries at the heart's
- *  share of the beat. @thread owner */
+/** Runs a network to a time and takes flows and profiles, which go on from those of the last run
+ *  when the network does, else begin steady; arteries at the heart's share of the beat.
+ *  @thread owner; no allocation */
 SONDE_API void sonde_flow_scene_run(sonde_flow_scene *scene, sonde_flow *flow, double until_s);
+/** All that the next run goes on from. */
+typedef struct sonde_flow_scene_memory {
+  sonde_flow flow; /**< as the last run left it */
+  double profile_m_s[SONDE_FLOW_SEGMENTS][SONDE_FLOW_RINGS];
+} sonde_flow_scene_memory;
+/** @thread owner; no allocation */
+SONDE_API sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_scene *scene);
+/** Goes on from there. @thread owner; no allocation */
+SONDE_API void sonde_flow_scene_recall(sonde_flow_scene *scene,
+                                       const sonde_flow_scene_memory *memory);
 /** What moves in the cells of a box now: lumina as the interior has them, at the places where the
  *  echo's last picture draws them.
  *  @param[out] cells [SONDE_COLOUR_CELLS] @thread owner; no allocation */

@@ -265,22 +265,100 @@ static void controls_survive_the_bytes(void **state) {
   c.posture = SONDE_POSTURE_STANDING;
   c.stiffness_scale = 1.0 / 0.7, c.damping_scale = 1.0 / 3.0, c.friction_scale = 0.1;
   c.pathology.wall_shear_pa = 12345.678;
+  c.squeeze = 5, c.deep_breath = 6;
+  c.duplex = (sonde_duplex_controls){SONDE_DUPLEX_POWER, {-0.01, 0.012, 0.004, 0.04, 0.1}, 0.25, 3};
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   bytes_cursor w = {bytes, sizeof bytes, 0};
   sonde_controls_put(&w, &c);
   bytes_reader r = {bytes};
   back.probe = 0;
-  sonde_controls_get(&r, 4, &back);
+  sonde_controls_get(&r, SONDE_RECORD_VERSION, &back);
   assert_true(r.at == bytes + w.count);
+  assert_true(back.squeeze == 5 && back.deep_breath == 6);
+  assert_memory_equal(&back.duplex, &c.duplex, sizeof c.duplex);
   assert_memory_equal(&back.pathology, &c.pathology, sizeof c.pathology);
   assert_true(back.gel && back.valsalva && back.gel_put == 3 && back.gel_wipe == 4);
   assert_true(back.preset == 1 && back.posture == SONDE_POSTURE_STANDING);
   assert_true(back.stiffness_scale == c.stiffness_scale);
   assert_true(back.damping_scale == c.damping_scale && back.friction_scale == c.friction_scale);
   r.at = bytes;
+  sonde_controls_get(&r, 8, &back);
+  assert_int_equal(r.at - bytes, 208);
+  assert_true(back.gel_put == 3 && back.squeeze == 0 && back.duplex.shown == SONDE_DUPLEX_OFF);
+  r.at = bytes;
   sonde_controls_get(&r, 3, &back);
   assert_int_equal(r.at - bytes, 152);
   assert_true(!back.gel && back.stiffness_scale == 1 && back.friction_scale == 1);
+}
+
+// Mean velocity along the beam that colour shows within 2 mm of the vein's middle below the probe,
+// m/s; 0 where less than half of it is in colour.
+static double vein_colour(const sonde_session *session, const sonde_frame *frame) {
+  const sonde_interior *in = session->interior;
+  const sonde_colour_overlay *over = &frame->colour.over;
+  double nearest = INFINITY, sum = 0;
+  int there = 0, shown = 0;
+  sonde_vec3 at = vec3(0, 0, 0);
+  for (uint32_t i = 0; i < in->course[0].count; ++i) {
+    sonde_vec3 centre =
+        pose_apply_inverse(frame->snapshot.world_from_probe, in->state[0][i].centre_m);
+    if (fabs(centre.x) < nearest) nearest = fabs(centre.x), at = centre;
+  }
+  for (uint32_t k = 0; frame->colour.shown && k < over->width * over->height; ++k) {
+    const double size = frame->width_m / frame->width;
+    const double x = (over->left + k % over->width + 0.5 - 0.5 * frame->width) * size;
+    const double z = (over->top + k / over->width + 0.5) * size;
+    const double v = (over->pixels[k] - 128.0) / 127 * frame->colour.limit_m_s;
+    if (hypot(x - at.x, z - at.z) > 2e-3) continue;
+    ++there;
+    if (over->pixels[k]) sum += v, ++shown;
+  }
+  return 2 * shown > there ? sum / shown : 0;
+}
+
+// Along the vein, lightly: colour shows its blood, a squeeze of the calf speeds it up, a strain
+// stops it; in a clot nothing flows, and it comes back when colour is switched on again.
+static void colour_follows_blood_and_hand(void **state) {
+  sonde_site site = barrel_site();
+  site.u = vec3(0, 0, 1), site.v = vec3(0, -1, 0);
+  const sonde_script_key keys[] = {{0, sonde_site_pose(&site, -0.002)},
+                                   {0.1, sonde_site_pose(&site, 0.003)}};
+  sonde_device device;
+  assert_int_equal(sonde_device_script(keys, 2, 1e-3, &device, NULL), SONDE_OK);
+  sonde_session_def def = small_def(*state);
+  def.circulate = true;
+  def.controls.echo.depth_m = 0.05;
+  def.controls.duplex.shown = SONDE_DUPLEX_VELOCITY;
+  def.controls.duplex.box = (sonde_colour_box){-0.012, 0.012, 0.001, 0.05, 0.35};
+  def.controls.duplex.scale_m_s = 0.3;
+  sonde_session *session = open_session(&def, device);
+  sonde_session_controls c = sonde_session_controls_now(session);
+  sonde_frame frame = run(session, 400);
+  const double rest = vein_colour(session, &frame);
+  ++c.squeeze, set(session, c);
+  double squeezed = 0;
+  for (int k = 0; k < 60; ++k) {
+    frame = run(session, 20);
+    squeezed = fmax(squeezed, vein_colour(session, &frame) / rest);
+  }
+  run(session, 500);
+  c.valsalva = true, set(session, c);
+  run(session, 900);
+  frame = run(session, 100);
+  const double strained = vein_colour(session, &frame);
+  c.valsalva = false, set(session, c);
+  c.duplex.shown = SONDE_DUPLEX_OFF, set(session, c);
+  frame = run(session, 40);
+  assert_int_equal(frame.colour.shown, SONDE_DUPLEX_OFF);
+  c.duplex.shown = SONDE_DUPLEX_VELOCITY;
+  assert_int_equal(sonde_pathology_preset("acute_occlusive", &c.pathology, NULL), SONDE_OK);
+  set(session, c);
+  frame = run(session, 200);
+  print_message("rest %.1f cm/s along the beam, squeezed %.1f times, strain %.1f, clot %.1f\n",
+                100 * rest, squeezed, 100 * strained, 100 * vein_colour(session, &frame));
+  assert_true(fabs(rest) > 0.01 && squeezed > 2 && fabs(strained) < 0.3 * fabs(rest));
+  assert_true(vein_colour(session, &frame) == 0);
+  close_session(session);
 }
 
 static sonde_json *written_and_read(const sonde_setup *setup) {
@@ -379,6 +457,7 @@ int main(void) {
       cmocka_unit_test(bench_is_kept_in_range),
       cmocka_unit_test(recording_keeps_the_patient),
       cmocka_unit_test(controls_survive_the_bytes),
+      cmocka_unit_test(colour_follows_blood_and_hand),
       cmocka_unit_test(setup_survives_the_header),
       cmocka_unit_test(moments_are_kept),
   };

@@ -16,7 +16,7 @@ enum { MOST = 400 };
 // Hash of each image that a session showed, with its tick and forces.
 typedef struct seen {
   uint32_t count;
-  uint64_t tick[MOST], hash[MOST];
+  uint64_t tick[MOST], hash[MOST], colour[MOST];
   sonde_snapshot snapshot[MOST];
 } seen;
 
@@ -32,23 +32,33 @@ static int tear_down(void **state) {
   return 0;
 }
 
+static uint64_t colour_of(const sonde_frame *frame) {
+  const sonde_colour_overlay *over = &frame->colour.over;
+  return frame->colour.shown ? sonde_hash(1, over->pixels, (size_t)over->width * over->height) : 0;
+}
+
 static void look(sonde_session *session, seen *s) {
   sonde_frame frame;
   if (s->count >= MOST || !sonde_session_frame(session, &frame)) return;
   s->tick[s->count] = frame.snapshot.tick;
   s->snapshot[s->count] = frame.snapshot;
+  s->colour[s->count] = colour_of(&frame);
   s->hash[s->count++] = sonde_hash(0, frame.pixels, (size_t)frame.width * frame.height);
 }
 
-// Another case, another probe, other settings of the beam and back, while it runs.
+// Colour, a squeeze, another case, another probe, other settings of the beam and back, while it
+// runs.
 static void change_controls(sonde_session *session, uint64_t tick) {
   sonde_session_controls c = sonde_session_controls_now(session);
-  if (tick == 330) c.echo.frequency_hz = 5e6;
+  if (tick == 200) c.duplex.shown = SONDE_DUPLEX_VELOCITY;
+  if (tick == 330) c.echo.frequency_hz = 5e6, ++c.squeeze;
   if (tick == 500) c.echo.frequency_hz = 7.5e6, c.echo.gain_db = 3;
   if (tick == 610)
     assert_int_equal(sonde_pathology_preset("chronic", &c.pathology, NULL), SONDE_OK);
   if (tick == 800) c.probe = 2;
-  if (tick == 330 || tick == 500 || tick == 610 || tick == 800) sonde_session_control(session, &c);
+  if (tick == 700) c.duplex.scale_m_s = 0.1, ++c.deep_breath;
+  if (tick == 200 || tick == 330 || tick == 500 || tick == 610 || tick == 700 || tick == 800)
+    sonde_session_control(session, &c);
 }
 
 static const sonde_scanner *scanner; // of the recorded session; NULL: the plain one
@@ -99,8 +109,11 @@ static void played_through_it_shows_the_same(void **state) {
   sonde_player *player = open_player(*state, false, true);
   assert_int_equal(sonde_player_info(player)->images, s.count);
   for (uint32_t i = 0; i < s.count; ++i) {
+    sonde_frame frame;
     assert_true(sonde_player_next_image(player, true));
     same_frame(player, &s, i);
+    assert_true(sonde_player_frame(player, &frame) && colour_of(&frame) == s.colour[i]);
+    assert_true((s.colour[i] != 0) == (s.tick[i] > 200));
   }
   assert_false(sonde_player_next_image(player, true));
   sonde_replay_result result;
@@ -361,9 +374,9 @@ static void the_controls_are_told(void **state) {
   record(*state, 900, &s);
   sonde_player *player = open_player(*state, false, true);
   const sonde_player_event *events = player->events;
-  assert_int_equal(player->event_count, 5);
-  assert_true(events[0].time_s == 0 && fabs(events[3].time_s - 0.61) < 1e-9);
-  assert_true(events[3].controls.pathology.thrombus_fraction == 1);
+  assert_int_equal(player->event_count, 7);
+  assert_true(events[0].time_s == 0 && fabs(events[4].time_s - 0.61) < 1e-9);
+  assert_true(events[4].controls.pathology.thrombus_fraction == 1);
   assert_int_equal(sonde_player_seek(player, 0.4, NULL, NULL), SONDE_OK);
   assert_true(sonde_player_controls(player).echo.frequency_hz == 5e6);
   assert_int_equal(sonde_player_seek(player, 0.85, NULL, NULL), SONDE_OK);

@@ -36,13 +36,13 @@ static void lay(const tube *t) {
     const double z = xz[1] - 0.02, c = cos(t->angle_rad), s = sin(t->angle_rad);
     const double along = xz[0] * s - z * c, beside = xz[0] * c + z * s;
     const double radius = t->radius_m(along), at = fabs(beside) / radius * (SONDE_FLOW_RINGS - 1);
-    cells[i] = (sonde_colour_cell){0, 0, SONDE_COLOUR_NO_VESSEL}, truth[i] = 0;
+    cells[i] = (sonde_colour_cell){.vessel = SONDE_COLOUR_NO_VESSEL}, truth[i] = 0;
     if (!(at < SONDE_FLOW_RINGS - 1)) continue;
     const int k = (int)at;
     const double mean = t->mean_m_s * pow(t->radius_there_m / radius, 2);
     const double u = mean * (t->shape[k] + (at - k) * (t->shape[k + 1] - t->shape[k]));
     truth[i] = u * c;
-    cells[i] = (sonde_colour_cell){(float)(u * c), (float)(u * s), 0};
+    cells[i] = (sonde_colour_cell){(float)(u * c), (float)(u * s), 0, 0};
   }
 }
 
@@ -50,7 +50,7 @@ static void lay(const tube *t) {
 static void measure(sonde_colour *c, uint32_t frames) {
   for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) found[i] = power[i] = 0;
   for (uint32_t f = 0; f < frames; ++f) {
-    const sonde_colour_value *value = sonde_colour_frame(c, cells, 0);
+    const sonde_colour_value *value = sonde_colour_frame(c, cells);
     for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
       found[i] += (double)value[i].velocity_m_s / frames,
           power[i] += (double)value[i].power / frames;
@@ -160,7 +160,7 @@ static void test_folds(void **unused) {
   static const double OVER[] = {0.3, 0.6, 0.9, 1.1, 1.4, -0.9, -1.1};
   for (size_t k = 0; k < sizeof OVER / sizeof *OVER; ++k) {
     for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
-      cells[i] = (sonde_colour_cell){(float)(OVER[k] * limit), 0, 0};
+      cells[i] = (sonde_colour_cell){(float)(OVER[k] * limit), 0, 0, 0};
     sonde_colour *c = create(&def);
     measure(c, 4);
     double mean = 0;
@@ -172,26 +172,90 @@ static void test_folds(void **unused) {
   }
 }
 
-// Tissue and noise alone are not shown; blood that stands is not either; tissue that is moved is.
+// Tissue and noise alone are not shown; blood that stands is not either; tissue that is moved is;
+// blood in a shadow is not.
 static void test_shows(void **unused) {
   (void)unused;
   const sonde_colour_def def = sonde_colour_def_default();
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 4; ++k) {
     sonde_colour *c = create(&def);
     for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
-      cells[i] = (sonde_colour_cell){0, 0, k == 1 ? 0 : SONDE_COLOUR_NO_VESSEL};
-    const sonde_colour_value *value = sonde_colour_frame(c, cells, k == 2 ? 0.02 : 0);
+      cells[i] = (sonde_colour_cell){.towards_m_s = k >= 2 ? 0.02f : 0,
+                                     .vessel = k == 1 || k == 3 ? 0 : SONDE_COLOUR_NO_VESSEL,
+                                     .loss_db = k == 3 ? 60 : 0};
+    const sonde_colour_value *value = sonde_colour_frame(c, cells);
     uint32_t shown = 0;
     for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) shown += value[i].power > SONDE_COLOUR_POWER;
     print_message("%s: %u cells shown\n",
                   k == 0   ? "tissue"
                   : k == 1 ? "standing blood"
-                           : "flash",
+                  : k == 2 ? "flash"
+                           : "shadow",
                   shown);
-    if (k < 2) assert_true(shown < SONDE_COLOUR_CELLS / 1000);
+    if (k != 2) assert_true(shown < SONDE_COLOUR_CELLS / 1000);
     if (k == 2) assert_true(shown > SONDE_COLOUR_CELLS / 2);
     sonde_colour_destroy(c);
   }
+}
+
+// Other numbers and the number of a frame say all: a colour that was tuned there shows what one
+// shows that was made so.
+static void test_tunes(void **unused) {
+  (void)unused;
+  sonde_colour_def def = sonde_colour_def_default();
+  double shape[SONDE_FLOW_RINGS];
+  parabola(shape);
+  lay(&(tube){M_PI / 3, even, 0.1, 4e-3, shape});
+  sonde_colour *tuned = create(&def);
+  for (int k = 0; k < 3; ++k) sonde_colour_frame(tuned, cells);
+  def.pulse_hz = 3000, def.filter_order = 2, def.persistence = 0.5;
+  sonde_colour *made = create(&def);
+  assert_true(sonde_colour_tune(tuned, &def));
+  sonde_colour_next(tuned, 7, false), sonde_colour_next(made, 7, false);
+  for (int k = 0; k < 2; ++k) {
+    const sonde_colour_value *a = sonde_colour_frame(made, cells);
+    assert_memory_equal(a, sonde_colour_frame(tuned, cells), SONDE_COLOUR_CELLS * sizeof *a);
+  }
+  def.packet = 99;
+  assert_false(sonde_colour_tune(tuned, &def));
+  sonde_colour_destroy(tuned), sonde_colour_destroy(made);
+}
+
+// A picture shows each cell's velocity at its place, nothing on bright pixels and beside the box.
+static void test_paints(void **unused) {
+  (void)unused;
+  sonde_colour_def def = sonde_colour_def_default();
+  sonde_colour_box box = BOX;
+  box.steer_rad = 0.2;
+  for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) cells[i] = (sonde_colour_cell){0.05f, 0, 0, 0};
+  sonde_colour *c = create(&def);
+  measure(c, 4);
+  enum { SIDE = 128 };
+  static uint8_t grey[SIDE * SIDE], over[SIDE * SIDE];
+  const sonde_image image = {
+      .width = SIDE, .height = SIDE, .width_m = 0.04, .height_m = 0.04, .pixels = grey};
+  for (int k = 0; k < SIDE * SIDE; ++k) grey[k] = k % SIDE > SIDE / 2 ? 200 : 20;
+  sonde_colour_overlay overlay = {.pixels = over};
+  sonde_colour_paint(c, &box, 0, false, &image, &overlay);
+  uint32_t inside = 0, right = 0;
+  for (uint32_t y = 0; y < overlay.height; ++y)
+    for (uint32_t x = 0; x < overlay.width; ++x) {
+      const uint32_t column = overlay.left + x;
+      const uint8_t shown = over[y * overlay.width + x];
+      double at[2];
+      const bool in = sonde_colour_find(&box, (column + 0.5 - SIDE / 2) * 0.04 / SIDE,
+                                        (overlay.top + y + 0.5) * 0.04 / SIDE, at);
+      if (!in || column > SIDE / 2) assert_int_equal(shown, 0);
+      if (!in || column > SIDE / 2) continue;
+      ++inside, right += fabs(shown - (128 + 127 * 0.05 / sonde_colour_limit(&def))) < 6;
+    }
+  print_message("%u of %u pixels within 5 %% of the limit, in %u x %u\n", right, inside,
+                overlay.width, overlay.height);
+  assert_true(inside > 1000 && right > 0.95 * inside);
+  // Less gain than the blood is above the noise shows nothing.
+  sonde_colour_paint(c, &box, -40, true, &image, &overlay);
+  for (uint32_t k = 0; k < overlay.width * overlay.height; ++k) assert_int_equal(over[k], 0);
+  sonde_colour_destroy(c);
 }
 
 static void test_refuses(void **unused) {
@@ -223,7 +287,8 @@ int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_poiseuille), cmocka_unit_test(test_womersley),
       cmocka_unit_test(test_stenosis),   cmocka_unit_test(test_folds),
-      cmocka_unit_test(test_shows),      cmocka_unit_test(test_refuses),
+      cmocka_unit_test(test_shows),      cmocka_unit_test(test_tunes),
+      cmocka_unit_test(test_paints),     cmocka_unit_test(test_refuses),
       cmocka_unit_test(test_box)};
   if (argc > 1) cmocka_set_test_filter(argv[1]);
   return cmocka_run_group_tests(tests, NULL, NULL);

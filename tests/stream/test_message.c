@@ -65,14 +65,19 @@ static float f32_at(const unsigned char *b) {
   return value;
 }
 
-// A frame of two nodes and 2 x 1 pixels; the first node moved by far too much.
-static size_t small_frame(unsigned char *bytes, size_t capacity) {
+// A frame of two nodes and 2 x 1 pixels, of which colour covers the right one; the first node moved
+// by far too much.
+static size_t make_frame(unsigned char *bytes, size_t capacity, bool colour) {
   sonde_vec3 rest_points[2] = {{0.01, 0.02, 0.03}, {0, 0, 0}};
   sonde_mesh rest = {.vertex_count = 2, .vertices = rest_points};
   float skin[6] = {1.0f, 0.018f, 0.03f, 0, 0, NAN};
   uint8_t pixels[2] = {7, 200};
   sonde_frame frame = {
       .skin_m = skin, .pixels = pixels, .width = 2, .height = 1, .width_m = 0.06, .height_m = 0.07};
+  uint8_t over[1] = {201};
+  if (colour)
+    frame.colour = (sonde_frame_colour){
+        SONDE_DUPLEX_VELOCITY, {-0.01, 0.012, 0.004, 0.03, 0.25}, 0.0625, {1, 0, 1, 1, over}};
   sonde_snapshot *s = &frame.snapshot;
   s->tick = 0x0102030405060708u;
   s->time_s = 1.5;
@@ -84,6 +89,24 @@ static size_t small_frame(unsigned char *bytes, size_t capacity) {
   s->vein_area_ratio = (double)NAN;
   s->solver_iterations = 1000000;
   return page_encode_frame(&frame, &rest, 9, bytes, capacity);
+}
+
+static size_t small_frame(unsigned char *bytes, size_t capacity) {
+  return make_frame(bytes, capacity, false);
+}
+
+static void colour_stands_behind_the_image(void **state) {
+  (void)state;
+  unsigned char b[200] = {0};
+  assert_int_equal(make_frame(b, sizeof b, true), 154 + 36 + 1);
+  static const unsigned char HEAD[12] = {1, 0, 1, 0, 0, 0, 1, 0, 1, 0, 0, 0};
+  assert_int_equal(u32_at(b + 12), 154 + 36 + 1);
+  assert_memory_equal(b + 154, HEAD, sizeof HEAD);
+  assert_float_equal(f32_at(b + 166), 6.25, 0);       // limit, cm/s
+  assert_float_equal(f32_at(b + 170), -10, 0);        // box, mm
+  assert_float_equal(f32_at(b + 182), 30, 0);         //
+  assert_float_equal(f32_at(b + 186), 14.3239, 1e-4); // degrees
+  assert_int_equal(b[190], 201);
 }
 
 static void frame_fields_stand_where_the_protocol_says(void **state) {
@@ -390,6 +413,7 @@ int main(void) {
       cmocka_unit_test(mesh_has_golden_bytes),
       cmocka_unit_test(an_encoder_never_writes_beyond_its_buffer),
       cmocka_unit_test(line_has_golden_bytes),
+      cmocka_unit_test(colour_stands_behind_the_image),
       cmocka_unit_test(frame_fields_stand_where_the_protocol_says),
       cmocka_unit_test(displacements_are_rounded_and_saturate),
       cmocka_unit_test(the_hello_can_be_read_by_a_json_parser),

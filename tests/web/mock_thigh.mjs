@@ -91,7 +91,9 @@ export class SyntheticThigh {
       type: "controls", controls: true, probe: "linear", case: "healthy", stop: false, gain_db: 0, depth_mm: 70, frequency_mhz: 7.5,
       dynamic_range_db: 60, focus_mm: 25, tgc_db_per_cm: 0.5, posture: "supine", valsalva: false, gel: true, gel_ml: 0,
       stiffness_scale: 1, damping_scale: 1, friction_scale: 1,
+      colour: "off", colour_box_mm: [-14, 14, 6, 36], colour_steer_deg: 0, colour_scale_cm_s: 6, colour_gain_db: 0,
     };
+    this.hand = []; // what the free hand and the patient did
     this.pose = { position_mm: [6, RADIUS(140) + 12, 140], rotation: [0.7071, 0.7071, 0, 0] };
     this.goal = this.pose;
     this.fault = 0;
@@ -135,6 +137,7 @@ export class SyntheticThigh {
     else if (m.type === "stop") this.fault = 1;
     else if (m.type === "resume") this.fault = 0;
     else if (m.type === "gel") this.controls.gel_ml = m.action === "put" ? this.controls.gel_ml + 2 : 0;
+    else if (m.type === "hand") this.hand.push(m.action);
     else if (m.type === "controls") for (const key of Object.keys(m)) if (key in this.controls && key !== "type" && key !== "controls") this.controls[key] = m[key];
     this.controls.stop = this.fault !== 0;
     return ["stop", "resume", "gel", "controls"].includes(m.type);
@@ -167,7 +170,8 @@ export class SyntheticThigh {
     const s = this.state();
     const nodes = this.skin.points.length / 3;
     const [w, h] = [WIDTH_MM * PX_PER_MM, Math.round(this.controls.depth_mm * PX_PER_MM)];
-    const b = head(3, ++this.sequence, 140 + 6 * nodes + w * h);
+    const colour = this.colour(w, h);
+    const b = head(3, ++this.sequence, 140 + 6 * nodes + w * h + colour.length);
     b.writeBigUInt64LE(BigInt(Math.round(this.time_s * 1000)), 16);
     b.writeDoubleLE(this.time_s, 24);
     b.writeUInt32LE(nodes, 32);
@@ -180,7 +184,20 @@ export class SyntheticThigh {
       seen(s.vein), seen(s.artery), seen(2 * VEIN.radius * s.vein), WIDTH_MM, this.controls.depth_mm, QUANTUM_MM];
     values.forEach((v, i) => b.writeFloatLE(v, 52 + 4 * i));
     this.dent(b, s);
-    this.image(b.subarray(140 + 6 * nodes), w, h, s);
+    this.image(b.subarray(140 + 6 * nodes, 140 + 6 * nodes + w * h), w, h, s);
+    colour.copy(b, 140 + 6 * nodes + w * h);
+    return b;
+  }
+
+  /** The box, full of the greatest velocity towards the probe. */
+  colour(w, h) {
+    const shown = ["off", "velocity", "power"].indexOf(this.controls.colour);
+    if (shown === 0) return Buffer.alloc(0);
+    const [left, right, top, bottom] = this.controls.colour_box_mm;
+    const place = [left * PX_PER_MM + w / 2, top * PX_PER_MM, (right - left) * PX_PER_MM, Math.min(bottom * PX_PER_MM, h) - top * PX_PER_MM].map(Math.round);
+    const b = Buffer.alloc(36 + place[2] * place[3], 255);
+    [shown, ...place, 0].forEach((v, i) => b.writeUInt16LE(v, 2 * i));
+    [this.controls.colour_scale_cm_s, left, right, top, bottom, this.controls.colour_steer_deg].forEach((v, i) => b.writeFloatLE(v, 12 + 4 * i));
     return b;
   }
 

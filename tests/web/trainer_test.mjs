@@ -346,6 +346,47 @@ async function testPatient(page, mock) {
   check(mock.thigh.controls.stiffness_scale === 1.5, "position, strain, gel and tissue reach the program");
 }
 
+/** Colour is on the image where the program says, its box follows the hand, and the buttons reach the program. */
+async function testDuplex(page, mock) {
+  const colours = () => page.evaluate(() => {
+    const all = document.querySelector(".pane:not([hidden]) canvas");
+    const d = all.getContext("2d").getImageData(0, 0, all.width, all.height).data;
+    let count = 0;
+    for (let i = 0; i < d.length; i += 4) if (d[i] !== d[i + 2]) ++count;
+    return count / (d.length / 4);
+  });
+  check((await colours()) === 0, "without Doppler the image is grey");
+  await page.locator("#colour").click();
+  await page.waitForFunction(() => !document.getElementById("duplex-tools").hidden);
+  await page.waitForFunction(() => document.querySelector(".pane:not([hidden]) .doppler .box").getAttribute("d")?.startsWith("M"));
+  const share = await colours();
+  const [l, r, t, b] = mock.thigh.controls.colour_box_mm;
+  const wanted = ((r - l) * (b - t)) / (60 * mock.thigh.controls.depth_mm);
+  check(Math.abs(share / wanted - 1) < 0.05, "colour covers the box and nothing else");
+  const grip = await page.locator(".pane:not([hidden]) .doppler .grip").first().boundingBox();
+  await page.mouse.move(grip.x + 10, grip.y + 10);
+  await page.mouse.down();
+  await page.mouse.move(grip.x + 40, grip.y + 30, { steps: 3 });
+  await page.mouse.up();
+  await page.waitForFunction(() => window.sonde.controls.colour_box_mm[0] > -14 + 1);
+  check(Math.abs(mock.thigh.controls.colour_box_mm[1] - mock.thigh.controls.colour_box_mm[0] - 28) < 1e-3, "a dragged box keeps its size");
+  await page.locator("#scale-more").click();
+  await page.locator("#steer-more").click();
+  await page.locator("#gain-less").click();
+  await page.waitForFunction(() => window.sonde.controls.colour_gain_db === -2);
+  await page.locator("#squeeze").click();
+  await page.locator("#scene").focus();
+  await page.keyboard.press("Shift+V");
+  await page.keyboard.press("Shift+M");
+  await page.waitForFunction(() => window.sonde.controls.colour === "power");
+  const { colour_scale_cm_s: scale, colour_steer_deg: steer } = mock.thigh.controls;
+  check(scale === 8 && steer === 20 && mock.thigh.hand.join() === "squeeze,breathe", "scale, lean, squeeze and breath reach the program");
+  await inspect(page, "duplex");
+  await page.screenshot({ path: path.join(outDir, "duplex.png") });
+  await page.keyboard.press("Shift+B");
+  await page.waitForFunction(() => document.getElementById("duplex-tools").hidden);
+}
+
 /** Two fingers that go up press. */
 async function testTouch(page) {
   const before = await page.evaluate(() => window.sonde.depth);
@@ -403,6 +444,7 @@ async function main() {
     await testCalipers(page);
     await testCompare(page);
     await testPatient(page, mock);
+    await testDuplex(page, mock);
     await testTouch(page);
     check(errors.length === 0, `no errors on the console${errors.map((e) => `\n       ${e}`).join("")}`);
   } finally {

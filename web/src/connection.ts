@@ -3,6 +3,7 @@
 import { clientId, isStranger, takeToken, token } from "./access";
 import {
   decode,
+  type ColourWish,
   type Decision,
   type Frame,
   type Guidance,
@@ -71,6 +72,12 @@ export class Connection {
   }
   gel(action: "put" | "wipe"): void {
     this.send({ type: "gel", action });
+  }
+  colour(wish: ColourWish): void {
+    this.send({ type: "controls", ...wish });
+  }
+  hand(action: "squeeze" | "breathe"): void {
+    this.send({ type: "hand", action });
   }
   role(action: RoleAction): void {
     this.send({ type: "role", action });

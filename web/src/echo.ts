@@ -3,6 +3,7 @@
 
 import { Calipers, type Tool } from "./calipers";
 import { label, make } from "./dom";
+import { DopplerBox, paintColour } from "./duplex";
 import type { Controls, Frame } from "./protocol";
 
 const RULER_PX = 40;
@@ -26,6 +27,7 @@ class Pane {
   readonly canvas = make("canvas");
   readonly title = make("span", "pane-title");
   readonly calipers: Calipers;
+  readonly doppler = new DopplerBox();
   width_mm = 60;
   height_mm = 70;
   private readonly image: CanvasRenderingContext2D;
@@ -36,7 +38,7 @@ class Pane {
     this.image = context(this.canvas);
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", name);
-    this.root.append(this.canvas, this.calipers.svg, this.title);
+    this.root.append(this.canvas, this.doppler.svg, this.calipers.svg, this.title);
   }
 
   /** True when the size in millimetres changed. */
@@ -49,6 +51,8 @@ class Pane {
     const rgba = new Uint32Array(this.data.data.buffer);
     const grey = frame.pixels;
     for (let i = 0; i < grey.length; ++i) rgba[i] = 0xff000000 | (grey[i]! * 0x010101);
+    if (frame.colour) paintColour(rgba, frame.width, frame.colour);
+    this.doppler.show(frame.colour);
     this.image.putImageData(this.data, 0, 0);
     const same = frame.width_mm === this.width_mm && frame.height_mm === this.height_mm;
     this.width_mm = frame.width_mm;
@@ -69,6 +73,7 @@ class Pane {
     const style = { left: `${left}px`, top: `${top}px`, width: `${this.width_mm * scale}px`, height: `${this.height_mm * scale}px` };
     Object.assign(this.root.style, style);
     this.calipers.layout(this.width_mm, this.height_mm, scale);
+    this.doppler.layout(this.width_mm, this.height_mm, scale);
   }
 }
 
@@ -98,6 +103,10 @@ export class EchoView {
     new ResizeObserver(() => this.layout()).observe(box);
   }
 
+  /** of the live image */
+  get doppler(): DopplerBox {
+    return this.live.doppler;
+  }
   get isFrozen(): boolean {
     return this.frozen;
   }

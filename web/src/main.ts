@@ -5,6 +5,7 @@ import { gradient } from "./colour";
 import { Connection } from "./connection";
 import { Dial } from "./dial";
 import { announce, find, label, minutes, press, pressed, recall, release, remember } from "./dom";
+import { Duplex } from "./duplex";
 import { EchoView } from "./echo";
 import { ExamBar } from "./exam";
 import { ForceBar } from "./force_bar";
@@ -63,6 +64,7 @@ class App {
   private readonly sliders = new Sliders(find("sliders"), (key, value) => this.connection.set(key, value));
   private readonly tools = new EchoTools(this.echo);
   private readonly patient: PatientTools;
+  private readonly duplex: Duplex;
   private readonly examBar: ExamBar;
   readonly worksheet: Worksheet;
   private readonly replayBar: ReplayBar;
@@ -91,6 +93,7 @@ class App {
       refused: () => this.refused(),
     }));
     this.patient = new PatientTools(connection);
+    this.duplex = new Duplex(connection, this.echo.doppler);
     this.examBar = new ExamBar({
       decide: (segment, decision) => connection.decide(segment, decision),
       write: (segment, decision) => this.worksheet.write(segment, decision),
@@ -180,7 +183,7 @@ class App {
     else if (code === "Digit0" && this.hands) this.setDepth(EASED_MM);
     else if (this.phase === "replay" && this.controls?.controls && this.replayBar.key(code, shift)) return true;
     else if (this.worksheet.key(code, shift)) return true;
-    else return this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
+    else return this.duplex.key(code, shift) || this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
     return true;
   }
 
@@ -228,6 +231,7 @@ class App {
     this.sliders.set(controls);
     this.echo.set(controls);
     this.patient.set(controls);
+    this.duplex.set(controls);
     this.scene.setGel((controls.gel_ml ?? 0) > 0.05);
     if (probeChanged) this.plot.clear();
     this.curveKey = "";

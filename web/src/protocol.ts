@@ -103,8 +103,17 @@ export interface Controls {
   stiffness_scale?: number;
   damping_scale?: number;
   friction_scale?: number;
+  // of a flat face: Doppler
+  colour?: ColourShown;
+  /** left, right (from the middle of the face), top, bottom */
+  colour_box_mm?: [number, number, number, number];
+  colour_steer_deg?: number;
+  colour_scale_cm_s?: number;
+  colour_gain_db?: number;
 }
 
+export type ColourShown = "off" | "velocity" | "power";
+export type ColourWish = Partial<Pick<Controls, "colour" | "colour_box_mm" | "colour_steer_deg" | "colour_scale_cm_s" | "colour_gain_db">>;
 export type Role = "learner" | "watcher" | "teacher";
 export type RoleAction = "take" | "give" | "return";
 export type Posture = "supine" | "sitting" | "standing";
@@ -301,6 +310,24 @@ export interface Frame {
   width_mm: number;
   height_mm: number;
   pixels: Uint8Array;
+  /** null: Doppler is off */
+  colour: ColourFrame | null;
+}
+
+/** Colour over a rectangle of a frame's image. */
+export interface ColourFrame {
+  shown: "velocity" | "power";
+  left: number;
+  top: number;
+  width: number;
+  height: number;
+  /** velocity along the beam from which it folds */
+  limit_cm_s: number;
+  /** left, right, top, bottom */
+  box_mm: [number, number, number, number];
+  steer_deg: number;
+  /** 0: none; 1 to 255: velocity from the limit away over 0 (128) to the limit towards the probe, or power */
+  pixels: Uint8Array;
 }
 
 export const PART = { skin: 0, femur: 1, vein: 2, artery: 3, probe: 16, branch: 256 } as const;
@@ -310,6 +337,7 @@ export const VERSIONS = [1, 2, 3];
 const HEADER = 16;
 const MESH_FIXED = 24;
 const FRAME_FIXED = 140;
+const COLOUR_FIXED = 36;
 const MAGIC = 0x45444e53; // "SNDE", little-endian
 
 /** Reads one value after the other. */
@@ -344,6 +372,25 @@ class Cursor {
   quat(): Quat {
     return [this.f32(), this.f32(), this.f32(), this.f32()];
   }
+}
+
+function decodeColour(bytes: ArrayBuffer, at: number): ColourFrame | null {
+  if (at + COLOUR_FIXED > bytes.byteLength) return null;
+  const c = new Cursor(new DataView(bytes), at);
+  const shown = c.u16() === 2 ? "power" : "velocity";
+  const [left, top, width, height] = [c.u16(), c.u16(), c.u16(), c.u16()];
+  c.u16();
+  return {
+    shown,
+    left,
+    top,
+    width,
+    height,
+    limit_cm_s: c.f32(),
+    box_mm: c.quat(),
+    steer_deg: c.f32(),
+    pixels: new Uint8Array(bytes, at + COLOUR_FIXED, width * height),
+  };
 }
 
 function decodeFrame(bytes: ArrayBuffer, sequence: number): Frame {
@@ -386,6 +433,7 @@ function decodeFrame(bytes: ArrayBuffer, sequence: number): Frame {
     width_mm,
     height_mm,
     pixels: new Uint8Array(bytes, FRAME_FIXED + nodes * 6, width * height),
+    colour: decodeColour(bytes, FRAME_FIXED + nodes * 6 + width * height),
   };
 }
 

@@ -29,6 +29,7 @@ sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted
   p->lumen_scale = usable_real(p->lumen_scale, q->lumen_scale, 0.1, 3.0);
   p->echogenicity = usable_real(p->echogenicity, q->echogenicity, 0.0, 1.0);
   controls.echo = sonde_echo_settings_clamp(wanted->echo);
+  controls.duplex = sonde_duplex_clean(&wanted->duplex, &before->duplex);
   if ((unsigned)controls.posture >= SONDE_POSTURE_COUNT) controls.posture = before->posture;
   if (controls.preset >= SONDE_SESSION_PRESETS) controls.preset = before->preset;
   controls.stiffness_scale =

@@ -1,4 +1,5 @@
 // Controls as bytes of a recording (docs/recording.md): the one place that knows their order.
+#include "exam/duplex.h"
 #include "exam/record.h"
 
 #include "base/base.h"
@@ -8,16 +9,19 @@
 #include <string.h>
 
 // Members that follow each other in memory as in the file.
-enum { ECHO = 6, PATHOLOGY = 8 };
+enum { ECHO = 6, PATHOLOGY = 8, BOX = 5 };
 _Static_assert(offsetof(sonde_echo_settings, tgc_db_per_m) == (ECHO - 1) * sizeof(double),
                "the settings' numbers from frequency_hz on");
 _Static_assert(offsetof(sonde_pathology, echogenicity) ==
                    offsetof(sonde_pathology, venous_pressure_pa) + (PATHOLOGY - 1) * sizeof(double),
                "the pathology's numbers from venous_pressure_pa on");
 
+_Static_assert(offsetof(sonde_colour_box, steer_rad) == (BOX - 1) * sizeof(double),
+               "the box's numbers from left_m on");
+
 size_t sonde_controls_bytes(int version) {
   SONDE_ASSERT(version >= SONDE_RECORD_OLDEST && version <= SONDE_RECORD_VERSION);
-  return version < 4 ? 152 : 208;
+  return version < 4 ? 152 : version < 9 ? 208 : 280;
 }
 
 void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
@@ -38,6 +42,13 @@ void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
   bytes_f64(w, c->stiffness_scale);
   bytes_f64(w, c->damping_scale);
   bytes_f64(w, c->friction_scale);
+  bytes_u32(w, c->squeeze);
+  bytes_u32(w, c->deep_breath);
+  bytes_u32(w, c->duplex.shown);
+  bytes_u32(w, 0);
+  for (int i = 0; i < BOX; ++i) bytes_f64(w, (&c->duplex.box.left_m)[i]);
+  bytes_f64(w, c->duplex.scale_m_s);
+  bytes_f64(w, c->duplex.gain_db);
   SONDE_ASSERT(w->count == start + sonde_controls_bytes(SONDE_RECORD_VERSION));
 }
 
@@ -49,6 +60,8 @@ void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c)
   const unsigned char *start = r->at;
   *c = (sonde_session_controls){
       .probe = c->probe, .stiffness_scale = 1, .damping_scale = 1, .friction_scale = 1};
+  const sonde_duplex_controls usual = sonde_duplex_controls_default();
+  c->duplex = usual;
   double *echo = &c->echo.frequency_hz, *vessels = &c->pathology.venous_pressure_pa;
   c->stop = bytes_take_u32(r) & 1;
   c->resume = bytes_take_u32(r);
@@ -72,6 +85,18 @@ void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c)
     c->stiffness_scale = within(bytes_take_f64(r), 0.5, 2.0);
     c->damping_scale = within(bytes_take_f64(r), 0.25, 4.0);
     c->friction_scale = within(bytes_take_f64(r), 0.0, 2.0);
+  }
+  if (version >= 9) {
+    c->squeeze = bytes_take_u32(r);
+    c->deep_breath = bytes_take_u32(r);
+    const uint32_t shown = bytes_take_u32(r);
+    (void)bytes_take_u32(r);
+    sonde_duplex_controls duplex = {.shown = shown <= SONDE_DUPLEX_POWER ? (sonde_duplex_shown)shown
+                                                                         : SONDE_DUPLEX_OFF};
+    for (int i = 0; i < BOX; ++i) (&duplex.box.left_m)[i] = bytes_take_f64(r);
+    duplex.scale_m_s = bytes_take_f64(r);
+    duplex.gain_db = bytes_take_f64(r);
+    c->duplex = sonde_duplex_clean(&duplex, &usual);
   }
   SONDE_ASSERT(r->at == start + sonde_controls_bytes(version));
 }

@@ -245,6 +245,7 @@ sonde_status sonde_player_seek(sonde_player *player, double time_s, const sonde_
   if (!here && !jumped) sonde_player_restart(player);
   // Wherever the player was before, the next image is one of all looks.
   if (player->session->echo) sonde_echo_begin_looks(player->session->echo);
+  if (player->session->duplex) sonde_duplex_forget(player->session->duplex);
   make_image(player);
   uint64_t start = tick_of(player);
   for (uint64_t tick = start; tick < goal && tick_once(player); ++tick) {

@@ -20,8 +20,7 @@ sonde_status sonde_player_check(sonde_player *player, bool images, const sonde_p
     more = sonde_player_next_image(player, images);
     sonde_frame frame;
     if (more && images && sonde_player_frame(player, &frame))
-      result->image_hash =
-          sonde_hash(result->image_hash, frame.pixels, (size_t)frame.width * frame.height);
+      result->image_hash = sonde_frame_hash(result->image_hash, &frame);
     if (!more) sonde_player_advance(player, player->info.duration_s);
     result->images += more;
     // Hashes of the state and of the images come in the order of their ticks each, but not

@@ -15,6 +15,7 @@ sonde_session_def sonde_session_def_default(void) {
                            .image_height = 512,
                            .ticks_per_image = 20};
   def.controls.echo = sonde_echo_settings_default();
+  def.controls.duplex = sonde_duplex_controls_default();
   def.controls.stiffness_scale = def.controls.damping_scale = def.controls.friction_scale = 1;
   sonde_status status = sonde_pathology_preset("healthy", &def.controls.pathology, NULL);
   SONDE_ASSERT(status == SONDE_OK);
@@ -52,6 +53,10 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   image.scanner = def->scanner, image.rolling = def->scanner != NULL;
   if (!status && inside)
     status = sonde_echo_create(session->interior, &image, &session->echo, error);
+  const bool flat = !(def->scanner && def->scanner->radius_m > 0);
+  if (!status && inside && flat)
+    status =
+        sonde_duplex_create(def->model, session->interior, session->echo, &session->duplex, error);
   if (!status) {
     size_t vectors = session->nodes * sizeof(sonde_vec3);
     size_t surface_end = sizeof(sonde_surface_slot), frame_end = sizeof(sonde_frame);
@@ -60,6 +65,7 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
     session->film_at = place(&surface_end, session->nodes * sizeof(double));
     session->skin_at = place(&frame_end, 3 * session->nodes * sizeof(float));
     session->pixels_at = place(&frame_end, (size_t)session->image_width * session->image_height);
+    session->colour_at = place(&frame_end, (size_t)session->image_width * session->image_height);
     status = sonde_mailbox_create(sizeof(sonde_session_controls), &session->control_box, error);
     if (!status) status = sonde_mailbox_create(surface_end, &session->surface_box, error);
     if (!status) status = sonde_mailbox_create(frame_end, &session->frame_box, error);
@@ -89,6 +95,7 @@ static void release(sonde_session *session) {
   sonde_mailbox_destroy(session->control_box);
   sonde_mailbox_destroy(session->surface_box);
   sonde_mailbox_destroy(session->frame_box);
+  sonde_duplex_destroy(session->duplex);
   sonde_echo_destroy(session->echo);
   sonde_interior_destroy(session->interior);
   sonde_subject_destroy(session->subject);

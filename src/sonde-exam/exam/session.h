@@ -10,6 +10,7 @@
 
 #include "base/mailbox.h"
 #include "base/ring.h"
+#include "exam/duplex.h"
 #include "exam/record.h"
 #include "exam/subject.h"
 #include "interior/interior.h"
@@ -38,6 +39,7 @@ typedef struct sonde_surface_slot {
   sonde_session_controls controls;
   sonde_pathology pathology; // of the controls, with the pressures of this tick
   sonde_circulation circulation;
+  sonde_hand_moment hand;
   double pose_s; // clock when the tick read its pose; 0 in lockstep
   bool keyframe; // one was taken with it
 } sonde_surface_slot;
@@ -66,6 +68,7 @@ typedef struct sonde_image_memory {
   sonde_pathology shown_pathology;
   sonde_session_beam beam, coming;
   sonde_interior_memory interior;
+  sonde_duplex_memory duplex;
 } sonde_image_memory;
 
 // In mailbox slots on the way to the recorder: the world, followed by sonde_subject_remember(), and
@@ -96,7 +99,8 @@ struct sonde_session {
   uint32_t ticks_per_image;
   uint32_t image_width, image_height;
   size_t nodes;
-  size_t positions_at, forces_at, film_at, skin_at, pixels_at; // offsets inside mailbox slots
+  size_t positions_at, forces_at, film_at, skin_at, pixels_at,
+      colour_at; // offsets inside mailbox slots
 
   // tick
   sonde_subject *subject;
@@ -116,6 +120,7 @@ struct sonde_session {
   // image
   sonde_interior *interior;
   sonde_echo *echo;
+  sonde_duplex *duplex;            // NULL: a curved face, or no inside
   sonde_pathology shown_pathology; // of the controls
   uint32_t lines;                  // of the image
   sonde_vec3 *line_m;              // [lines] where each starts
@@ -192,6 +197,8 @@ sonde_status sonde_session_recall(sonde_session *session, const sonde_tick_memor
 bool sonde_session_show(sonde_session *session);
 bool sonde_session_follow(sonde_session *session);
 void sonde_session_draw(sonde_session *session);
+// Hash of a frame's pixels and colour behind those before it.
+uint64_t sonde_frame_hash(uint64_t before, const sonde_frame *frame);
 // The journal of the definition, if it asks for one, and what leads to it.
 sonde_status sonde_session_create_recording(sonde_session *session, const sonde_session_def *def,
                                             const char *const *probe_names, sonde_error *error);

@@ -50,6 +50,7 @@ void sonde_session_offer(sonde_session *session) {
   head->controls = session->controls;
   head->pathology = sonde_subject_pathology(session->subject);
   head->circulation = session->subject->now.circulation;
+  head->hand = session->subject->now.hand;
   head->pose_s = session->last_tick_s;
   // All that the next tick depends on goes to the recorder when a keyframe is due.
   uint64_t place =

@@ -46,6 +46,15 @@ static double couple(sonde_session *session, const unsigned char *slot) {
   return sum / session->lines;
 }
 
+static sonde_duplex_moment duplex_moment(const sonde_session *session,
+                                         const sonde_surface_slot *head) {
+  return (sonde_duplex_moment){.time_s = (double)head->snapshot.tick * session->dt_s,
+                               .controls = &head->controls.duplex,
+                               .circulation =
+                                   session->subject->setup.circulate ? &head->circulation : NULL,
+                               .hand = head->hand};
+}
+
 bool sonde_session_follow(sonde_session *session) {
   const unsigned char *slot = sonde_mailbox_read(session->surface_box);
   if (!slot) return false;
@@ -76,6 +85,8 @@ bool sonde_session_follow(sonde_session *session) {
         .posture = head->controls.posture,
     };
     sonde_interior_update(session->interior, &input);
+    const sonde_duplex_moment moment = duplex_moment(session, head);
+    if (session->duplex) sonde_duplex_follow(session->duplex, &moment);
     session->shown = true;
     session->shown_tick = head->snapshot.tick;
     session->shown_pathology = *pathology;
@@ -124,16 +135,13 @@ void sonde_session_draw(sonde_session *session) {
     if (!sonde_surface_inside(rest, pose.position)) depth_m = -depth_m;
   }
   // The skin in single precision.
-  const sonde_vec3 *positions_m = (const void *)(session->surface + session->positions_at);
+  const double *positions_m = (const void *)(session->surface + session->positions_at);
   float *skin_m = (float *)(void *)(out + session->skin_at);
-  for (size_t i = 0; i < session->nodes; ++i) {
-    skin_m[3 * i] = (float)positions_m[i].x;
-    skin_m[3 * i + 1] = (float)positions_m[i].y;
-    skin_m[3 * i + 2] = (float)positions_m[i].z;
-  }
+  for (size_t i = 0; i < 3 * session->nodes; ++i) skin_m[i] = (float)positions_m[i];
   sonde_image image = {.width = session->image_width,
                        .height = session->image_height,
                        .pixels = out + session->pixels_at};
+  sonde_frame_colour colour = {.over.pixels = out + session->colour_at};
   double coupling = couple(session, session->surface);
   bool off = head->snapshot.flags & SONDE_FLAG_INSIDE_OUT; // the probe sees no body
   if (session->echo && !off) {
@@ -145,6 +153,11 @@ void sonde_session_draw(sonde_session *session) {
     sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
                       &head->pathology, &settings, &image);
     SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
+    const sonde_duplex_moment moment = duplex_moment(session, head);
+    if (session->duplex)
+      sonde_duplex_draw(session->duplex, &moment, &image, settings.frequency_hz,
+                        head->controls.gel ? session->line_coupling : NULL, session->lines,
+                        &colour);
   } else {
     memset(image.pixels, 0, (size_t)image.width * image.height);
     if (session->echo)
@@ -156,7 +169,8 @@ void sonde_session_draw(sonde_session *session) {
                          .width = image.width,
                          .height = image.height,
                          .width_m = image.width_m,
-                         .height_m = image.height_m};
+                         .height_m = image.height_m,
+                         .colour = colour};
   frame->snapshot.gel_coupling = coupling;
   const double *film_m = (const void *)(session->surface + session->film_at);
   double gel_m3 = head->controls.gel ? 0 : (double)NAN;
@@ -169,13 +183,19 @@ void sonde_session_draw(sonde_session *session) {
   if (session->interior && !off) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
   // All pixels so far, so that one number tells whether a replay shows the same.
   if (session->image_checks) {
-    size_t count = (size_t)frame->width * frame->height;
-    session->images_hash = sonde_hash(session->images_hash, frame->pixels, count);
+    session->images_hash = sonde_frame_hash(session->images_hash, frame);
     sonde_record_check check = {SONDE_CHECK_IMAGES, frame->snapshot.tick, session->images_hash};
     (void)sonde_ring_push(session->image_checks, &check); // the end has the last one at any rate
   }
   if (session->watch) session->watch(session->watch_user, frame);
   sonde_mailbox_publish(session->frame_box);
+}
+
+uint64_t sonde_frame_hash(uint64_t before, const sonde_frame *frame) {
+  const sonde_colour_overlay *over = &frame->colour.over;
+  const uint64_t hash = sonde_hash(before, frame->pixels, (size_t)frame->width * frame->height);
+  return frame->colour.shown ? sonde_hash(hash, over->pixels, (size_t)over->width * over->height)
+                             : hash;
 }
 
 bool sonde_session_show(sonde_session *session) {

@@ -14,6 +14,7 @@ void sonde_session_remember_image(const sonde_session *session, sonde_image_memo
   memory->shown_pathology = session->shown_pathology;
   memory->beam = session->beam, memory->coming = session->coming;
   if (session->interior) sonde_interior_remember(session->interior, &memory->interior);
+  if (session->duplex) memory->duplex = sonde_duplex_remember(session->duplex);
 }
 
 static bool beam_usable(const sonde_session_beam *beam, bool any) {
@@ -37,6 +38,7 @@ sonde_status sonde_session_recall(sonde_session *session, const sonde_tick_memor
   if (!status && session->interior)
     status = sonde_interior_recall(session->interior, &inside->interior, error);
   if (status) return status;
+  if (session->duplex) sonde_duplex_recall(session->duplex, &inside->duplex);
   session->controls =
       sonde_controls_clean(&inputs->controls, &session->controls, session->probe_count);
   session->sample = inputs->sample;

@@ -3,6 +3,7 @@
 #ifndef SONDE_SRC_SUBJECT_H
 #define SONDE_SRC_SUBJECT_H
 
+#include "exam/duplex.h"
 #include "exam/setup.h"
 #include "sonde/haptics_gel.h"
 
@@ -12,9 +13,10 @@ enum { SONDE_GEL_TICKS = 20 }; // of a step of the film, a part of it per tick
 typedef struct sonde_subject_moment {
   sonde_session_controls controls; // in force
   sonde_circulation circulation;   // with the posture and the strain of the controls
-  sonde_friction friction;         // in force
-  sonde_pose pose;                 // of the probe in the last tick
-  sonde_vec3 drift_m_s;            // of the probe, mean over about a step of the gel
+  sonde_hand_moment hand;
+  sonde_friction friction; // in force
+  sonde_pose pose;         // of the probe in the last tick
+  sonde_vec3 drift_m_s;    // of the probe, mean over about a step of the gel
   bool placed, touching;
   bool carried;      // the last step turned skin inside out
   bool off;          // the probe is taken off until it has left the body

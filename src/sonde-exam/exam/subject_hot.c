@@ -38,6 +38,11 @@ void sonde_subject_control(sonde_subject *subject, const sonde_session_controls 
   subject->now.circulation.posture = held ? SONDE_POSTURE_SUPINE : controls->posture;
   if (controls->valsalva != before.valsalva)
     sonde_circulation_strain(&subject->now.circulation, time_s, controls->valsalva);
+  if (!subject->now.placed) subject->now.hand = (sonde_hand_moment){-INFINITY, -INFINITY};
+  if (subject->now.placed && controls->squeeze != before.squeeze)
+    subject->now.hand.squeeze_s = time_s;
+  if (subject->now.placed && controls->deep_breath != before.deep_breath)
+    subject->now.hand.breath_s = time_s;
   if (!subject->now.placed ||
       !(before.preset == controls->preset && before.stiffness_scale == controls->stiffness_scale &&
         before.damping_scale == controls->damping_scale))

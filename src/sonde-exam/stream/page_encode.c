@@ -74,6 +74,8 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
   SONDE_ASSERT(frame->width <= 0xffff && frame->height <= 0xffff);
   size_t pixels = (size_t)frame->width * frame->height;
   size_t size = PAGE_FRAME_FIXED_BYTES + 6 * (size_t)rest->vertex_count + pixels;
+  const sonde_colour_overlay *over = &frame->colour.over;
+  if (frame->colour.shown) size += PAGE_COLOUR_FIXED_BYTES + (size_t)over->width * over->height;
   if (size > capacity) return size;
   bytes_cursor out = {bytes, capacity, 0};
   put_header(&out, PAGE_FRAME, sequence, size);
@@ -112,6 +114,23 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
     bytes_u16(&out, quantise((double)frame->skin_m[3 * i + 2] - p.z));
   }
   bytes_put(&out, frame->pixels, pixels);
+  if (frame->colour.shown) {
+    const sonde_colour_box *box = &frame->colour.box;
+    SONDE_ASSERT(over->left + over->width <= 0xffff && over->top + over->height <= 0xffff);
+    bytes_u16(&out, (uint16_t)frame->colour.shown);
+    bytes_u16(&out, (uint16_t)over->left);
+    bytes_u16(&out, (uint16_t)over->top);
+    bytes_u16(&out, (uint16_t)over->width);
+    bytes_u16(&out, (uint16_t)over->height);
+    bytes_u16(&out, 0);
+    bytes_f32(&out, frame->colour.limit_m_s * 100);
+    bytes_f32(&out, box->left_m * MM);
+    bytes_f32(&out, box->right_m * MM);
+    bytes_f32(&out, box->top_m * MM);
+    bytes_f32(&out, box->bottom_m * MM);
+    bytes_f32(&out, box->steer_rad * 180 / SONDE_PI);
+    bytes_put(&out, over->pixels, (size_t)over->width * over->height);
+  }
   SONDE_ASSERT(out.count == size);
   return size;
 }

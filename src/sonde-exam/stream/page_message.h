@@ -13,6 +13,7 @@ enum {
   PAGE_HEADER_BYTES = 16,
   PAGE_MESH_FIXED_BYTES = 24,   // header and counts, before the points
   PAGE_FRAME_FIXED_BYTES = 140, // header and snapshot, before the displacements
+  PAGE_COLOUR_FIXED_BYTES = 36, // before the colours of a frame
   PAGE_COMMAND_BYTES = 4096,    // longest message accepted from a browser
   PAGE_COMMAND_DEPTH = 3,       // deepest nesting accepted
 };
@@ -83,6 +84,7 @@ typedef enum page_command_type {
   PAGE_COMMAND_PING,
   PAGE_COMMAND_GEL,
   PAGE_COMMAND_ROLE,
+  PAGE_COMMAND_HAND,
   PAGE_COMMAND_REQUEST
 } page_command_type;
 
@@ -93,9 +95,13 @@ typedef struct page_command {
   char probe[64], pathology[32];
   sonde_echo_settings echo; // likewise
   double stiffness_scale, damping_scale, friction_scale;
+  double colour_box_m[4]; // left, right, top, bottom
+  double colour_steer_rad, colour_scale_m_s, colour_gain_db;
+  int colour; // a sonde_duplex_shown; -1: as it is
   char posture[16];
   int strain; // 1, 0; -1: as it is
   bool gel_put, gel_wipe;
+  bool squeeze, deep_breath;
   page_may action; // of a role
   uint32_t id;     // of the acknowledged frame or of the ping
   sonde_page_request request;

@@ -93,7 +93,7 @@ static void read_vector(reader *r, const char *key, uint32_t count, double limit
 
 // One of the words of an action, counted from 0.
 static size_t read_action(reader *r, const char *const *words, size_t count, const char *expected) {
-  char action[8] = "";
+  char action[12] = "";
   read_name(r, "action", action, sizeof action);
   for (size_t i = 0; i < count; ++i)
     if (strcmp(action, words[i]) == 0) return i;
@@ -106,9 +106,19 @@ static double *setting_of(sonde_echo_settings *echo, const sonde_echo_range *ran
 }
 
 static void read_controls(reader *r, page_command *command) {
-  static const char *const OTHERS[] = {"type",     "probe",          "case",
-                                       "posture",  "damping_scale",  "friction_scale",
-                                       "valsalva", "stiffness_scale"};
+  static const char *const OTHERS[] = {"type",
+                                       "probe",
+                                       "case",
+                                       "posture",
+                                       "damping_scale",
+                                       "friction_scale",
+                                       "valsalva",
+                                       "stiffness_scale",
+                                       "colour",
+                                       "colour_box_mm",
+                                       "colour_steer_deg",
+                                       "colour_gain_db",
+                                       "colour_scale_cm_s"};
   const sonde_echo_range *range = sonde_echo_ranges();
   const double absent = (double)NAN;
   // An unknown key is a mistake of the page: what it asks for would not happen, unseen.
@@ -125,6 +135,22 @@ static void read_controls(reader *r, page_command *command) {
   command->stiffness_scale = read_real(r, "stiffness_scale", 0.5, 2, absent);
   command->damping_scale = read_real(r, "damping_scale", 0.25, 4, absent);
   command->friction_scale = read_real(r, "friction_scale", 0, 2, absent);
+  // Colour.
+  static const char *const SHOWN[] = {"off", "velocity", "power"};
+  const double reach_mm = 250;
+  char shown[16];
+  read_name(r, "colour", shown, sizeof shown);
+  command->colour = -1;
+  for (int k = 0; k < (int)SONDE_COUNT_OF(SHOWN); ++k)
+    if (strcmp(shown, SHOWN[k]) == 0) command->colour = k;
+  if (shown[0] && command->colour < 0) refuse(r, "\"colour\" must be off, velocity or power");
+  double *box = command->colour_box_m;
+  const bool boxed = sonde_json_member(r->root, "colour_box_mm") != NULL;
+  if (boxed) read_vector(r, "colour_box_mm", 4, reach_mm, box);
+  for (int k = 0; k < 4; ++k) box[k] = boxed ? 1e-3 * box[k] : absent;
+  command->colour_steer_rad = SONDE_PI / 180 * read_real(r, "colour_steer_deg", -20, 20, absent);
+  command->colour_scale_m_s = 1e-2 * read_real(r, "colour_scale_cm_s", 1, 100, absent);
+  command->colour_gain_db = read_real(r, "colour_gain_db", -30, 20, absent);
   read_name(r, "probe", command->probe, sizeof command->probe);
   read_name(r, "case", command->pathology, sizeof command->pathology);
   read_name(r, "posture", command->posture, sizeof command->posture);
@@ -165,9 +191,9 @@ static void read_request(reader *r, sonde_page_ask ask, sonde_page_request *q) {
 
 // Requests of the program after the page's own commands, in the order of sonde_page_ask.
 static const char *const TYPES[] = {
-    "goal",       "controls",    "stop",   "resume", "ack",      "ping",        "gel",
-    "role",       "start_exam",  "decide", "hint",   "position", "finish_exam", "leave_exam",
-    "list_exams", "open_replay", "seek",   "play",   "comment",  "worksheet"};
+    "goal",       "controls",   "stop",        "resume", "ack",  "ping",     "gel",
+    "role",       "hand",       "start_exam",  "decide", "hint", "position", "finish_exam",
+    "leave_exam", "list_exams", "open_replay", "seek",   "play", "comment",  "worksheet"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
 sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,
@@ -192,10 +218,11 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
   else if (which == SONDE_COUNT_OF(TYPES))
     r.status = sonde_fail(
         error, SONDE_NOT_FOUND,
-        "\"type\" must be goal, controls, stop, resume, ack, ping, gel, role or a request of "
+        "\"type\" must be goal, controls, stop, resume, ack, ping, gel, role, hand or a request of "
         "docs/page_protocol.md");
   else {
     static const char *const GEL[] = {"put", "wipe"}, *const ROLE[] = {"take", "give", "return"};
+    static const char *const HAND[] = {"squeeze", "breathe"};
     double p[3], q[4], norm2 = 0;
     bool request = which >= PAGE_COMMAND_REQUEST;
     command->type = request ? PAGE_COMMAND_REQUEST : (page_command_type)which;
@@ -224,6 +251,10 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
       command->gel_wipe = read_action(&r, GEL, SONDE_COUNT_OF(GEL), "put or wipe") == 1;
       command->gel_put = !command->gel_wipe;
       break;
+    case PAGE_COMMAND_HAND:
+      command->deep_breath = read_action(&r, HAND, SONDE_COUNT_OF(HAND), "squeeze or breathe") == 1;
+      command->squeeze = !command->deep_breath;
+      break;
     case PAGE_COMMAND_ROLE:
       command->action = (page_may)(PAGE_MAY_TAKE + read_action(&r, ROLE, SONDE_COUNT_OF(ROLE),
                                                                "take, give or return"));
@@ -248,6 +279,15 @@ void page_command_take(const page_command *command, sonde_session_controls *cont
   take(command->stiffness_scale, &controls->stiffness_scale);
   take(command->damping_scale, &controls->damping_scale);
   take(command->friction_scale, &controls->friction_scale);
+  sonde_duplex_controls *duplex = &controls->duplex;
+  if (command->colour >= 0) duplex->shown = (sonde_duplex_shown)command->colour;
+  take(command->colour_box_m[0], &duplex->box.left_m);
+  take(command->colour_box_m[1], &duplex->box.right_m);
+  take(command->colour_box_m[2], &duplex->box.top_m);
+  take(command->colour_box_m[3], &duplex->box.bottom_m);
+  take(command->colour_steer_rad, &duplex->box.steer_rad);
+  take(command->colour_scale_m_s, &duplex->scale_m_s);
+  take(command->colour_gain_db, &duplex->gain_db);
   if (command->strain >= 0) controls->valsalva = command->strain > 0;
   controls->echo = sonde_echo_settings_clamp(controls->echo);
 }

@@ -123,6 +123,9 @@ void page_command_apply(sonde_page_server *server, page_client *client,
   } else if (command->type == PAGE_COMMAND_GEL) {
     server->controls.gel_put += command->gel_put;
     server->controls.gel_wipe += command->gel_wipe;
+  } else if (command->type == PAGE_COMMAND_HAND) {
+    server->controls.squeeze += command->squeeze;
+    server->controls.deep_breath += command->deep_breath;
   } else if (command->type == PAGE_COMMAND_STOP) {
     server->controls.stop = true;
   } else {

@@ -5,6 +5,8 @@
 #include "base/maths.h"
 #include "base/random.h"
 
+#include <string.h>
+
 void sonde_colour_place(const sonde_colour_box *box, uint32_t line, uint32_t row, double xz_m[2]) {
   SONDE_ASSERT(box && line < SONDE_COLOUR_LINES && row < SONDE_COLOUR_ROWS);
   const double x = box->left_m + (box->right_m - box->left_m) * (line + 0.5) / SONDE_COLOUR_LINES;
@@ -37,25 +39,27 @@ double sonde_colour_limit(const sonde_colour_def *def) {
   return COLOUR_SOUND_M_S * def->pulse_hz / (4 * def->frequency_hz);
 }
 
-sonde_status sonde_colour_create(const sonde_colour_def *def, sonde_colour **out,
-                                 sonde_error *error) {
-  SONDE_ASSERT(def && out);
-  const sonde_bounded LIMIT[] = {{"frequency", def->frequency_hz, 1e6, 2e7},
-                                 {"pulse repetition", def->pulse_hz, 100, 2e4},
-                                 {"packet", def->packet, 4, COLOUR_PACKET},
-                                 {"filter order", def->filter_order, 0, COLOUR_ORDER},
-                                 {"beam", def->beam_m, 0.1e-3, 5e-3},
-                                 {"noise", def->noise_db, -100, 40},
-                                 {"clutter", def->clutter_db, -100, 80},
-                                 {"persistence", def->persistence, 0, 0.95}};
-  *out = NULL;
-  sonde_status status = sonde_bounded_check(LIMIT, SONDE_COUNT_OF(LIMIT), error);
-  if (status) return status;
-  sonde_colour *c = SONDE_NEW(sonde_colour, 1);
-  if (!c) return sonde_fail_memory(error);
-  c->def = *def;
-  for (uint32_t k = 0; k < COLOUR_NORMALS + SONDE_COLOUR_CELLS; ++k)
-    c->normal[k] = (float)sonde_random_normal(def->seed, k);
+enum { LIMITS = 8 };
+static void list_limits(const sonde_colour_def *def, sonde_bounded limit[LIMITS]) {
+  const sonde_bounded LIMIT[LIMITS] = {{"frequency", def->frequency_hz, 1e6, 2e7},
+                                       {"pulse repetition", def->pulse_hz, 100, 2e4},
+                                       {"packet", def->packet, 4, COLOUR_PACKET},
+                                       {"filter order", def->filter_order, 0, COLOUR_ORDER},
+                                       {"beam", def->beam_m, 0.1e-3, 5e-3},
+                                       {"noise", def->noise_db, -100, 40},
+                                       {"clutter", def->clutter_db, -100, 80},
+                                       {"persistence", def->persistence, 0, 0.95}};
+  memcpy(limit, LIMIT, sizeof LIMIT);
+}
+
+bool sonde_colour_tune(sonde_colour *c, const sonde_colour_def *def) {
+  SONDE_ASSERT(c && def);
+  sonde_bounded limit[LIMITS];
+  list_limits(def, limit);
+  for (int i = 0; i < LIMITS; ++i)
+    if (!(limit[i].value >= limit[i].low && limit[i].value <= limit[i].high)) return false;
+  const uint64_t seed = c->def.seed;
+  c->def = *def, c->def.seed = seed;
   // Orthonormal polynomials over the packet, by Gram and Schmidt.
   for (uint32_t order = 0; order <= def->filter_order; ++order) {
     double values[COLOUR_PACKET], norm = 0;
@@ -69,8 +73,30 @@ sonde_status sonde_colour_create(const sonde_colour_def *def, sonde_colour **out
     for (uint32_t n = 0; n < def->packet; ++n) norm += values[n] * values[n];
     for (uint32_t n = 0; n < def->packet; ++n) c->poly[order][n] = (float)(values[n] / sqrt(norm));
   }
+  return true;
+}
+
+sonde_status sonde_colour_create(const sonde_colour_def *def, sonde_colour **out,
+                                 sonde_error *error) {
+  SONDE_ASSERT(def && out);
+  *out = NULL;
+  sonde_bounded limit[LIMITS];
+  list_limits(def, limit);
+  sonde_status status = sonde_bounded_check(limit, LIMITS, error);
+  if (status) return status;
+  sonde_colour *c = SONDE_NEW(sonde_colour, 1);
+  if (!c) return sonde_fail_memory(error);
+  c->def.seed = def->seed;
+  (void)sonde_colour_tune(c, def);
+  for (uint32_t k = 0; k < COLOUR_NORMALS + SONDE_COLOUR_CELLS; ++k)
+    c->normal[k] = (float)sonde_random_normal(def->seed, k);
   *out = c;
   return SONDE_OK;
+}
+
+void sonde_colour_next(sonde_colour *c, uint64_t number, bool holds) {
+  SONDE_ASSERT(c != NULL);
+  c->frame = number, c->holds = holds;
 }
 
 void sonde_colour_destroy(sonde_colour *colour) { sonde_free(colour); }

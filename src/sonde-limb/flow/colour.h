@@ -9,7 +9,8 @@ enum { COLOUR_PACKET = 16, COLOUR_ORDER = 3, COLOUR_NORMALS = 1 << 16 };
 
 struct sonde_colour {
   sonde_colour_def def;
-  uint64_t frames;
+  uint64_t frame; // number of the next one
+  bool holds;     // whether it keeps a share of the one before
   float normal[COLOUR_NORMALS + SONDE_COLOUR_CELLS];
   float poly[COLOUR_ORDER + 1][COLOUR_PACKET]; // orthonormal over the packet
   uint32_t blood_count;
@@ -17,15 +18,17 @@ struct sonde_colour {
   float pattern[SONDE_COLOUR_CELLS][2];             // of the blood of each of them
   float turn[SONDE_COLOUR_CELLS][2];                // of its phase from pulse to pulse
   float keep[SONDE_COLOUR_CELLS];                   // of its pattern
+  float loss[SONDE_COLOUR_CELLS];                   // of its amplitude
   float echo[COLOUR_PACKET][2][SONDE_COLOUR_CELLS]; // the packet
+  float drift[2][SONDE_COLOUR_CELLS];               // of the tissue's phase from pulse to pulse
   float lag[3][SONDE_COLOUR_CELLS];                 // autocorrelation at 1, complex, and at 0
   float held[3][SONDE_COLOUR_CELLS];                // its averages
   sonde_colour_value value[SONDE_COLOUR_CELLS];
+  float shown[3][SONDE_COLOUR_CELLS]; // of a picture: power times the phase, complex; power
 };
 
 // Stages of a frame, in order (colour_hot.c); `drawn` counts random numbers.
-void colour_begin_echoes(sonde_colour *c, const sonde_colour_cell *cells, double tissue_m_s,
-                         uint32_t *drawn);
+void colour_begin_echoes(sonde_colour *c, const sonde_colour_cell *cells, uint32_t *drawn);
 void colour_begin_blood(sonde_colour *c, const sonde_colour_cell *cells, uint32_t *drawn);
 void colour_add_blood(sonde_colour *c, uint32_t pulse, uint32_t *drawn);
 void colour_correlate(sonde_colour *c);

@@ -24,6 +24,7 @@ void colour_begin_blood(sonde_colour *c, const sonde_colour_cell *cells, uint32_
     // A Gaussian beam that blood crosses by d keeps exp(-d^2/4 sigma^2) of its pattern.
     const double crossed = (double)cells[i].across_m_s / def->pulse_hz / def->beam_m;
     c->keep[b] = (float)exp(-0.25 * crossed * crossed);
+    c->loss[b] = cells[i].loss_db > 0 ? powf(10, -cells[i].loss_db / 20) : 1;
     for (int k = 0; k < 2; ++k) c->pattern[b][k] = c->normal[(*drawn)++ % COLOUR_NORMALS];
   }
 }
@@ -44,7 +45,7 @@ void colour_add_blood(sonde_colour *c, uint32_t pulse, uint32_t *drawn) {
     const int row = (int)(c->blood[b] / LINES), line = (int)(c->blood[b] % LINES);
     for (int j = row > 0 ? row - 1 : 0; j <= row + 1 && j < ROWS; ++j)
       for (int i = line > 0 ? line - 1 : 0; i <= line + 1 && i < LINES; ++i) {
-        const float w = WEIGHT[j - row + 1] * WEIGHT[i - line + 1];
+        const float w = c->loss[b] * WEIGHT[j - row + 1] * WEIGHT[i - line + 1];
         for (int k = 0; k < 2; ++k) c->echo[pulse][k][j * LINES + i] += w * p[k];
       }
   }
@@ -56,25 +57,36 @@ static const float *draw(const sonde_colour *c, uint32_t *drawn) {
   return c->normal + (*drawn >> 8) % COLOUR_NORMALS;
 }
 
-// Noise of the receiver, and tissue that moves as one; both over the blood's power of 2.
-void colour_begin_echoes(sonde_colour *c, const sonde_colour_cell *cells, double tissue_m_s,
-                         uint32_t *drawn) {
+// Noise of the receiver, and tissue, whose echo turns as it moves; both over the blood's power
+// of 2.
+void colour_begin_echoes(sonde_colour *c, const sonde_colour_cell *cells, uint32_t *drawn) {
   const sonde_colour_def *def = &c->def;
   const float noise = (float)pow(10, def->noise_db / 20),
               clutter = (float)pow(10, def->clutter_db / 20);
   const float *still[2] = {draw(c, drawn), draw(c, drawn)};
   float *tissue[2] = {c->lag[0], c->lag[1]}; // of use before the correlation
-  for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
-    for (int k = 0; k < 2; ++k)
-      tissue[k][i] = cells[i].vessel == SONDE_COLOUR_NO_VESSEL ? clutter * still[k][i] : 0;
-  const double radians =
-      4 * SONDE_PI * def->frequency_hz * tissue_m_s / (COLOUR_SOUND_M_S * def->pulse_hz);
+  const float radians_per_m_s =
+      (float)(4 * SONDE_PI * def->frequency_hz / (COLOUR_SOUND_M_S * def->pulse_hz));
+  bool moves = false;
+  for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) {
+    const bool solid = cells[i].vessel == SONDE_COLOUR_NO_VESSEL;
+    const float loss = cells[i].loss_db > 0 ? powf(10, -cells[i].loss_db / 20) : 1;
+    for (int k = 0; k < 2; ++k) tissue[k][i] = solid ? loss * clutter * still[k][i] : 0;
+    c->drift[0][i] = 1, c->drift[1][i] = 0;
+    if (!solid || cells[i].towards_m_s == 0) continue;
+    moves = true;
+    c->drift[0][i] = cosf(radians_per_m_s * cells[i].towards_m_s);
+    c->drift[1][i] = sinf(radians_per_m_s * cells[i].towards_m_s);
+  }
   for (uint32_t n = 0; n < def->packet; ++n) {
-    const float x = (float)cos(n * radians), y = (float)sin(n * radians);
     const float *random[2] = {draw(c, drawn), draw(c, drawn)};
-    for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) {
-      c->echo[n][0][i] = x * tissue[0][i] - y * tissue[1][i] + noise * random[0][i];
-      c->echo[n][1][i] = x * tissue[1][i] + y * tissue[0][i] + noise * random[1][i];
+    for (int k = 0; k < 2; ++k)
+      for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
+        c->echo[n][k][i] = tissue[k][i] + noise * random[k][i];
+    for (uint32_t i = 0; i < SONDE_COLOUR_CELLS && moves; ++i) {
+      const float re = tissue[0][i], im = tissue[1][i];
+      tissue[0][i] = c->drift[0][i] * re - c->drift[1][i] * im;
+      tissue[1][i] = c->drift[0][i] * im + c->drift[1][i] * re;
     }
   }
 }
@@ -115,7 +127,7 @@ void colour_correlate(sonde_colour *c) {
 // follow.
 void colour_average(sonde_colour *c) {
   const sonde_colour_def *def = &c->def;
-  const float held = c->frames ? (float)def->persistence : 0;
+  const float held = c->holds ? (float)def->persistence : 0;
   const float radians = (float)(sonde_colour_limit(def) / SONDE_PI);
   const float left = 1 - (float)(def->filter_order + 1) / (float)def->packet;
   const float noise = 2 * left * (float)pow(10, def->noise_db / 10);
@@ -135,17 +147,16 @@ void colour_average(sonde_colour *c) {
         (sonde_colour_value){radians * atan2f(c->held[1][i], c->held[0][i]), c->held[2][i] / noise};
 }
 
-const sonde_colour_value *sonde_colour_frame(sonde_colour *c, const sonde_colour_cell *cells,
-                                             double tissue_m_s) {
-  SONDE_ASSERT(c && cells && isfinite(tissue_m_s));
+const sonde_colour_value *sonde_colour_frame(sonde_colour *c, const sonde_colour_cell *cells) {
+  SONDE_ASSERT(c && cells);
   // Where the table of random numbers is entered.
-  uint32_t drawn = (uint32_t)sonde_random_bits(c->def.seed, c->frames + COLOUR_NORMALS);
-  colour_begin_echoes(c, cells, tissue_m_s, &drawn);
+  uint32_t drawn = (uint32_t)sonde_random_bits(c->def.seed, c->frame + COLOUR_NORMALS);
+  colour_begin_echoes(c, cells, &drawn);
   drawn = (uint32_t)sonde_random_mix(drawn);
   colour_begin_blood(c, cells, &drawn);
   for (uint32_t pulse = 0; pulse < c->def.packet; ++pulse) colour_add_blood(c, pulse, &drawn);
   colour_correlate(c);
   colour_average(c);
-  ++c->frames;
+  ++c->frame, c->holds = true;
   return c->value;
 }

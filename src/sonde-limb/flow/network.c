@@ -36,7 +36,8 @@ static const double arterioles_pa = 85 * SONDE_PA_PER_MMHG, held_pa = 15 * SONDE
                     cava_pa = 9 * SONDE_PA_PER_MMHG;
 // Shares of the belly's pressure that act on a segment from outside.
 static const double belly[N] = {0, 0, 0, 0, 0.2, 1, 0, 0};
-static const double squeeze_s = 1.5, strain_s = 0.5, pulse_pa = 0.12 * SONDE_PA_PER_MMHG;
+static const double squeeze_s = 1.5, strain_s = 0.5, deep_breath_s = 5, deep_breath_times = 5,
+                    pulse_pa = 0.12 * SONDE_PA_PER_MMHG;
 // A valve follows the flow in this time; open by w it has the resistance 1/(w^2 + least) of its
 // segment.
 static const double valve_s = 0.06, valve_least = 1e-5;
@@ -176,6 +177,7 @@ sonde_flow_def sonde_flow_def_default(const sonde_limb *limb) {
                         .heart_rate_hz = 1.15,
                         .breath_rate_hz = 0.25,
                         .breath_pa = 0.35 * SONDE_PA_PER_MMHG,
+                        .deep_breath_from_s = INFINITY,
                         .squeeze_from_s = INFINITY,
                         .squeeze_pa = 13 * SONDE_PA_PER_MMHG,
                         .valsalva_from_s = INFINITY,
@@ -213,14 +215,17 @@ void sonde_flow_def_hold(const sonde_limb_pose *pose, sonde_flow_def *def) {
 }
 
 static double smooth_rise(double t, double from, double length) {
-  return isfinite(from) ? smooth_step((t - from) / length) : 0;
+  return isfinite(from) ? smooth_step((t - from) / length) : from < 0;
 }
 
 // Pressures outside a segment and in the vena cava at a time.
 static double outside(const sonde_flow_def *def, double t, sonde_flow_segment segment) {
   double strain = smooth_rise(t, def->valsalva_from_s, strain_s) *
                   (1 - smooth_rise(t, def->valsalva_to_s, strain_s));
-  double breath = (1 - strain) * def->breath_pa * sin(2 * SONDE_PI * def->breath_rate_hz * t);
+  double deep = (t - def->deep_breath_from_s) / deep_breath_s;
+  double swing = sin(2 * SONDE_PI * def->breath_rate_hz * t) +
+                 (deep > 0 && deep < 1 ? deep_breath_times * sin(2 * SONDE_PI * deep) : 0);
+  double breath = (1 - strain) * def->breath_pa * swing;
   double inside = breath + strain * def->valsalva_pa;
   if (segment == N) // the chest takes part in a strain, and the heart's beat is felt
     return cava_pa + inside + pulse_pa * sin(2 * SONDE_PI * def->heart_rate_hz * t);
@@ -345,7 +350,6 @@ sonde_status sonde_flow_start(const sonde_flow_def *def, sonde_flow *flow, sonde
   for (uint32_t k = 0; k < N; ++k) {
     flow->volume_m3[k] = flow->rest_m3[k] =
         def->length_m[k] * whole_area(def, k) + blood_of_tissue * def->tissue_m3[k];
-    flow->open[k] = 1;
   }
   sonde_flow_def sound = *def;
   memset(sound.closed, 0, sizeof sound.closed);
@@ -353,8 +357,14 @@ sonde_status sonde_flow_start(const sonde_flow_def *def, sonde_flow *flow, sonde
   flow->def = sound;
   settle(flow, true);
   flow->def = *def;
-  settle(flow, false);
+  sonde_flow_settle(flow);
   return SONDE_OK;
+}
+
+void sonde_flow_settle(sonde_flow *flow) {
+  SONDE_ASSERT(flow != NULL);
+  settle(flow, false);
+  for (uint32_t k = 0; k < N; ++k) flow->open[k] = 1;
 }
 
 // Gauss without exchange of rows; the solution takes the place of the right side.

@@ -50,6 +50,7 @@ sonde_status sonde_flow_scene_create(const sonde_limb *limb, const sonde_interio
     return sonde_fail_memory(error);
   }
   s->interior = in, s->all = all;
+  s->flow.time_s = (double)NAN;
   const sonde_limb_pose *pose = limb ? sonde_limb_pose_of(in->model) : NULL;
   for (uint32_t v = 0; v < in->vessel_count; ++v) {
     s->section[v] = all, all += in->course[v].count;
@@ -123,7 +124,7 @@ void sonde_flow_scene_narrow(const sonde_flow_scene *s, sonde_flow_def *def) {
 void sonde_flow_scene_run(sonde_flow_scene *s, sonde_flow *flow, double until_s) {
   SONDE_ASSERT(s && flow && isfinite(until_s));
   const double step_s = 1e-3;
-  for (int k = 0; k < SONDE_FLOW_SEGMENTS && flow->time_s <= 0; ++k)
+  for (int k = 0; k < SONDE_FLOW_SEGMENTS && !(flow->time_s == s->flow.time_s); ++k)
     sonde_flow_steady(sonde_flow_velocity(flow, (sonde_flow_segment)k), s->profile[k]);
   while (flow->time_s < until_s - 1e-9) {
     sonde_flow_step(flow, step_s);
@@ -144,6 +145,19 @@ void sonde_flow_scene_run(sonde_flow_scene *s, sonde_flow *flow, double until_s)
   const double radius_m = 3.5e-3;
   sonde_flow_pulsed(wave, SAMPLES, radius_m, flow->def.heart_rate_hz, beat - floor(beat),
                     s->artery_profile);
+}
+
+sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_scene *s) {
+  SONDE_ASSERT(s != NULL);
+  sonde_flow_scene_memory memory = {.flow = s->flow};
+  memcpy(memory.profile_m_s, s->profile, sizeof s->profile);
+  return memory;
+}
+
+void sonde_flow_scene_recall(sonde_flow_scene *s, const sonde_flow_scene_memory *memory) {
+  SONDE_ASSERT(s && memory);
+  s->flow = memory->flow;
+  memcpy(s->profile, memory->profile_m_s, sizeof s->profile);
 }
 
 double sonde_flow_scene_velocity(const sonde_flow_scene *s, uint32_t vessel, sonde_pose pose) {

@@ -20,8 +20,8 @@ typedef struct scene_section {
 
 struct sonde_flow_scene {
   const sonde_interior *interior;
-  scene_section *all, *section[SONDE_VESSELS]; // [sections of each vessel]
-  sonde_flow flow;
+  scene_section *all, *section[SONDE_VESSELS];           // [sections of each vessel]
+  sonde_flow flow;                                       // as the last run left it
   double profile[SONDE_FLOW_SEGMENTS][SONDE_FLOW_RINGS]; // of the main veins
   double artery_m_s, artery_profile[SONDE_FLOW_RINGS];
 };

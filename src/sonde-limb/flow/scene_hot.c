@@ -97,8 +97,10 @@ static void lay(const piece *p, sonde_pose probe, const sonde_colour_box *box,
       sonde_colour_place(box, (uint32_t)line, (uint32_t)row, xz);
       if (!blood_at(p, pose_apply(probe, vec3(xz[0], 0, xz[1])), &velocity)) continue;
       const double towards = -v_dot(velocity, beam);
-      *cell = (sonde_colour_cell){
-          (float)towards, (float)sqrt(fmax(v_norm2(velocity) - towards * towards, 0)), p->vessel};
+      *cell = (sonde_colour_cell){.towards_m_s = (float)towards,
+                                  .across_m_s =
+                                      (float)sqrt(fmax(v_norm2(velocity) - towards * towards, 0)),
+                                  .vessel = p->vessel};
     }
 }
 
@@ -108,7 +110,7 @@ void sonde_flow_scene_cells(const sonde_flow_scene *s, const sonde_echo *echo,
   const sonde_interior *in = s->interior;
   const sonde_pose probe = sonde_truth_pose(echo);
   for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
-    cells[i] = (sonde_colour_cell){0, 0, SONDE_COLOUR_NO_VESSEL};
+    cells[i] = (sonde_colour_cell){.vessel = SONDE_COLOUR_NO_VESSEL};
   for (uint32_t v = 0; v < in->vessel_count; ++v)
     for (uint32_t i = 0; i + 1 < in->course[v].count; ++i) {
       piece p = {

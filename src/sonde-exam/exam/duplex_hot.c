@@ -1,0 +1,112 @@
+// Blood and colour of one image.
+#include "exam/duplex.h"
+
+#include "base/base.h"
+#include "base/maths.h"
+#include "echo/truth.h"
+
+enum { GRID = SONDE_DUPLEX_GRID, PLACES = GRID * GRID };
+
+void sonde_duplex_forget(sonde_duplex *d) {
+  SONDE_ASSERT(d != NULL);
+  d->seen = false;
+}
+
+void sonde_duplex_follow(sonde_duplex *d, const sonde_duplex_moment *now) {
+  SONDE_ASSERT(d && now && isfinite(now->time_s));
+  if (now->controls->shown == SONDE_DUPLEX_OFF) {
+    d->flows = d->seen = false;
+    return;
+  }
+  // Patient and hand now; veins as probe and clots leave them.
+  sonde_flow_def def = d->body.def;
+  const sonde_circulation *c = now->circulation;
+  if (c) {
+    def.heart_rate_hz = c->heart_rate_hz, def.breath_rate_hz = c->breath_rate_hz;
+    if (c->valsalva_to_s > c->valsalva_from_s)
+      def.valsalva_from_s = c->valsalva_from_s, def.valsalva_to_s = c->valsalva_to_s;
+  }
+  if (isfinite(now->hand.squeeze_s)) def.squeeze_from_s = now->hand.squeeze_s;
+  if (isfinite(now->hand.breath_s)) def.deep_breath_from_s = now->hand.breath_s;
+  sonde_flow_scene_narrow(d->scene, &def);
+  sonde_flow flow = sonde_flow_scene_remember(d->scene).flow;
+  const double most_s = 1; // the network does not run through what no image showed
+  if (!(d->flows && now->time_s >= flow.time_s && now->time_s - flow.time_s <= most_s)) {
+    flow = d->body, flow.def = def, flow.time_s = now->time_s;
+    sonde_flow_settle(&flow);
+  }
+  d->flows = true, flow.def = def;
+  sonde_flow_scene_run(d->scene, &flow, now->time_s);
+}
+
+void sonde_duplex_move(sonde_duplex *d, const sonde_duplex_moment *now, const sonde_image *image,
+                       const sonde_colour_box *box, const float *coupling, uint32_t lines) {
+  float towards[PLACES] = {0};
+  double dark_from_m[GRID]; // how far from the face a line meets bone or no body
+  const sonde_vec3 beam = q_rotate(sonde_truth_pose(d->echo).rotation,
+                                   vec3(sin(box->steer_rad), 0, cos(box->steer_rad)));
+  const bool known = d->seen && now->time_s > d->seen_s && d->seen_width_m == image->width_m &&
+                     d->seen_height_m == image->height_m;
+  for (uint32_t i = 0; i < GRID; ++i) {
+    dark_from_m[i] = INFINITY;
+    for (uint32_t j = 0; j < GRID; ++j) {
+      sonde_truth_pixel pixel;
+      const uint32_t k = j * GRID + i, column = (2 * i + 1) * image->width / (2 * GRID),
+                     row = (2 * j + 1) * image->height / (2 * GRID);
+      (void)sonde_truth_at(d->echo, image, column, row, &pixel);
+      if (pixel.label == SONDE_LABEL_OUTSIDE || pixel.label == SONDE_LABEL_BONE)
+        dark_from_m[i] = fmin(dark_from_m[i], j * image->height_m / GRID);
+      const sonde_vec3 way = v_sub(pixel.rest_m, d->rest_m[k]);
+      if (known && v_finite(way))
+        towards[k] = (float)(v_dot(way, beam) / (now->time_s - d->seen_s));
+      d->rest_m[k] = pixel.rest_m;
+    }
+  }
+  d->seen = true, d->seen_s = now->time_s;
+  d->seen_width_m = image->width_m, d->seen_height_m = image->height_m;
+  for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) {
+    double xz[2];
+    sonde_colour_place(box, i % SONDE_COLOUR_LINES, i / SONDE_COLOUR_LINES, xz);
+    const double across = clamp((xz[0] / image->width_m + 0.5) * GRID - 0.5, 0, GRID - 1);
+    const double down = clamp(xz[1] / image->height_m * GRID - 0.5, 0, GRID - 1);
+    const int x = (int)fmin(across, GRID - 2), y = (int)fmin(down, GRID - 2);
+    const float a = (float)(across - x), b = (float)(down - y), *at = towards + y * GRID + x;
+    d->cells[i].towards_m_s +=
+        (1 - b) * ((1 - a) * at[0] + a * at[1]) + b * ((1 - a) * at[GRID] + a * at[GRID + 1]);
+    const double dark_db = 60, line = (xz[0] / image->width_m + 0.5) * (lines - 1);
+    if (!(line >= 0 && line <= lines - 1) || xz[1] > dark_from_m[lround(across)])
+      d->cells[i].loss_db = (float)dark_db;
+    else if (coupling)
+      d->cells[i].loss_db = -20 * log10f(fmaxf(coupling[lround(line)], 1e-3f));
+  }
+}
+
+void sonde_duplex_draw(sonde_duplex *d, const sonde_duplex_moment *now, const sonde_image *image,
+                       double frequency_hz, const float *coupling, uint32_t lines,
+                       sonde_frame_colour *out) {
+  SONDE_ASSERT(d && now && image && out && out->over.pixels && lines > 1);
+  const sonde_duplex_controls *c = now->controls;
+  out->shown = SONDE_DUPLEX_OFF;
+  if (!d->flows) return;
+  // The box within the picture, and pulses as far apart as the scale wants and the depth allows.
+  sonde_colour_box box = c->box;
+  const double least_m = 4e-3, half_m = 0.5 * image->width_m;
+  box.left_m = clamp(box.left_m, -half_m, half_m - least_m);
+  box.right_m = clamp(box.right_m, box.left_m + least_m, half_m);
+  box.top_m = clamp(box.top_m, 0, image->height_m - least_m);
+  box.bottom_m = clamp(box.bottom_m, box.top_m + least_m, image->height_m);
+  sonde_colour_def def = sonde_colour_def_default();
+  const double highest_hz = 5e6, sound_m_s = 1540, most_hz = sound_m_s / (2 * box.bottom_m);
+  def.frequency_hz = fmin(frequency_hz, highest_hz), def.persistence = 0.7;
+  def.pulse_hz =
+      clamp(def.pulse_hz * c->scale_m_s / sonde_colour_limit(&def), 100, fmin(most_hz, 2e4));
+  if (!sonde_colour_tune(d->colour, &def)) return;
+  sonde_flow_scene_cells(d->scene, d->echo, &box, d->cells);
+  const bool holds = d->seen;
+  sonde_duplex_move(d, now, image, &box, coupling, lines);
+  sonde_colour_next(d->colour, (uint64_t)llround(1e3 * now->time_s), holds);
+  (void)sonde_colour_frame(d->colour, d->cells);
+  sonde_colour_paint(d->colour, &box, c->gain_db, c->shown == SONDE_DUPLEX_POWER, image,
+                     &out->over);
+  out->shown = c->shown, out->box = box, out->limit_m_s = sonde_colour_limit(&def);
+}
