@@ -18,7 +18,7 @@
 
 static const double CLOSED = 0.05, STEP_M = 1.5e-3, DEEPEST_M = 0.060, BEYOND = 1.25, LIFT_M = 2e-3;
 static const double AT_ONCE_S = -1,
-                    LATER_S = 10; // vessels in equilibrium, with a window that stays
+                    LATER_S = 10; // vessels in equilibrium, with the window that follows
 static const double CUFF_MMHG[][2] = {{14, 40}, {28, 90}, {36, 110}}, CUFF_STEP = 2; // by posture
 static const char *const CLOTS[] = {"acute_occlusive", "subacute_occlusive", "chronic_occlusive",
                                     "partial_mural"};
@@ -240,6 +240,7 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
   if (!status) status = sonde_pathology_preset("healthy", &l.healthy, error);
   if (!status) {
     sonde_interior_for_vessels(l.interior, true);
+    sonde_interior_wait(l.interior, true);
     l.limb = sonde_limb_of(l.model);
     sonde_limb_stations(l.limb, stations);
     for (int s = 0; s < SONDE_LIMB_STATIONS; ++s)
