@@ -132,7 +132,7 @@ static void every_cut_is_noticed(void **state) {
   sonde_free(bytes);
   write_file("{\"not\": \"a recording\"}", 22);
   assert_int_equal(inspect(NULL), SONDE_FORMAT);
-  write_file("SONDE-RECORDING 9\n{}\n", 21);
+  write_file("SONDE-RECORDING 99\n{}\n", 22);
   assert_int_equal(inspect(NULL), SONDE_VERSION);
   unlink(path);
   assert_int_equal(inspect(NULL), SONDE_IO);
