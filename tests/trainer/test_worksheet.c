@@ -61,6 +61,9 @@ static bool look(void *user, uint64_t tick, sonde_sheet_picture *picture) {
 
 static void an_entry_is_taken_as_a_whole(void **state) {
   (void)state;
+#define FIVE_MARKS                                                                                 \
+  "{\"place\":0,\"picture\":7,\"marks\":[[0,0,1,1,0],[0,0,1,1,0],[0,0,1,1,0],[0,0,1,1,0],"         \
+  "[0,0,1,1,0]]}"
   static const char *const WRONG[] = {"",
                                       "[]",
                                       "3",
@@ -91,8 +94,7 @@ static void an_entry_is_taken_as_a_whole(void **state) {
                                       "{\"place\":0,\"picture\":7,\"marks\":[[1,2,3,4]]}",
                                       "{\"place\":0,\"picture\":7,\"marks\":[[1,2,3,4,-5]]}",
                                       "{\"place\":0,\"picture\":7,\"marks\":[3]}",
-                                      "{\"place\":0,\"picture\":7,\"marks\":[[0,0,1,1,0],[0,0,1,1,"
-                                      "0],[0,0,1,1,0],[0,0,1,1,0],[0,0,1,1,0]]}",
+                                      FIVE_MARKS,
                                       "{\"change\":1}",
                                       "{\"change\":1,\"drop\":true}",
                                       "{\"hold\":1.5}",
