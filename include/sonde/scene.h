@@ -134,8 +134,9 @@ typedef struct sonde_scene_report {
   uint32_t cuts;               /**< parts made in place of a step so that no body passes through */
   uint32_t awake;              /**< slots that took part in the last solve */
   uint32_t touch_points;       /**< integration points of all contacts */
-  double newton_residual;      /**< |g| at the last evaluation over the first */
-  double error_m;              /**< estimate by step doubling; 0 without substeps */
+  uint64_t contact_tests; /**< pairs of boxes and of faces compared by the contacts' searches */
+  double newton_residual; /**< |g| at the last evaluation over the first */
+  double error_m;         /**< estimate by step doubling; 0 without substeps */
   double contact_s, assembly_s, solve_s;
 } sonde_scene_report;
 

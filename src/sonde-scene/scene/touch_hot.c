@@ -258,6 +258,7 @@ static void find_touch(sonde_scene_state *state, uint32_t t, bool start) {
                              state->now.hint[t]))
     return;
   const sonde_overlap_result *found = sonde_overlap_get(overlap);
+  state->report.contact_tests += found->box_tests + found->face_pairs;
   if (found->flags) state->report.flags |= SONDE_SCENE_CONTACT_FULL;
   pair->volume_m3 = found->volume_m3;
   pair->region_count = found->region_count;
