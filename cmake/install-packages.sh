@@ -25,6 +25,7 @@ build_packages() {
   need_library libpng libpng-dev
   need_library libjpeg libjpeg-dev
   need_library sqlite3 libsqlite3-dev
+  need_library libmd libmd-dev # SHA-1 and SHA-256
   need_library yaml-0.1 libyaml-dev
   need_library - libnifti2-dev # no pkg-config file
   need_library zlib zlib1g-dev
@@ -37,6 +38,9 @@ test_packages() {
   need_library libcjson libcjson-dev # a second reader of JSON
   need_library cmocka libcmocka-dev
   need_library ccd libccd-dev
+  need_library hdf5 libhdf5-dev # data sets as HDF5, and a reader of them
+  installed python3-h5py || missing+=(python3-h5py)
+  need_command ld.lld lld # links hundreds of tests in a third of the time
   need_command clang clang
   need_command clang-format-14 clang-format-14
   need_command clang-tidy-14 clang-tidy-14

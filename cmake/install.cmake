@@ -38,7 +38,7 @@ sonde_pc(sonde-limb OF sonde-files sonde)
 sonde_pc(sonde-sweep OF sonde OTHERS zlib)
 sonde_pc(sonde-scene OF sonde-files sonde)
 sonde_pc(sonde-fit OF sonde-files sonde)
-sonde_pc(sonde-exam OF sonde-fit sonde-limb sonde-sweep sonde-files sonde OTHERS sqlite3 zlib)
+sonde_pc(sonde-exam OF sonde-fit sonde-limb sonde-sweep sonde-files sonde OTHERS sqlite3 libmd zlib)
 
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/thigh ${PROJECT_SOURCE_DIR}/data/scenes

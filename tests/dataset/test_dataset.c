@@ -7,11 +7,11 @@
 #include <unistd.h>
 
 static void check_sum(const char *text, size_t times, const char *expected) {
-  char digest[SONDE_SHA256_TEXT];
-  sonde_sha256 sum;
-  sonde_sha256_begin(&sum);
-  for (size_t k = 0; k < times; ++k) sonde_sha256_add(&sum, text, strlen(text));
-  sonde_sha256_end(&sum, digest);
+  char digest[SHA256_DIGEST_STRING_LENGTH];
+  SHA2_CTX sum;
+  SHA256Init(&sum);
+  for (size_t k = 0; k < times; ++k) SHA256Update(&sum, (const uint8_t *)text, strlen(text));
+  SHA256End(&sum, digest);
   assert_string_equal(digest, expected);
 }
 

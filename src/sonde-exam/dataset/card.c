@@ -125,7 +125,7 @@ sonde_status sonde_dataset_finish(const sonde_dataset_def *def, sonde_dataset_co
   sonde_file *file[FILES] = {NULL};
   sonde_status status = SONDE_OK;
   for (int k = 0; k < FILES && !status; ++k) status = sonde_file_in_memory(&file[k], error);
-  char path[SONDE_DATASET_PATH], digest[SONDE_SHA256_TEXT], *text = NULL;
+  char path[SONDE_DATASET_PATH], digest[SHA256_DIGEST_STRING_LENGTH], *text = NULL;
   size_t bytes;
   sonde_dataset_path(def->directory, NAMES[PLAN], path);
   if (!status) status = sonde_file_load(path, &text, &bytes, error);
@@ -142,17 +142,10 @@ sonde_status sonde_dataset_finish(const sonde_dataset_def *def, sonde_dataset_co
       sonde_json_put_text(&out, "made_by", "sonde " SONDE_VERSION_STRING);
       sonde_json_put_integer(&out, "frames", c->all.frames);
       sonde_json_put_integer(&out, "bytes", (int64_t)c->bytes);
-      sonde_json_begin_list(&out, "files");
-      for (uint32_t i = 0; i < c->files; ++i) {
-        sonde_json_begin_object(&out, NULL);
-        sonde_json_put_text(&out, "path", c->file[i].path);
-        sonde_json_put_integer(&out, "bytes", (int64_t)c->file[i].bytes);
-        sonde_json_put_text(&out, "sha256", c->file[i].sha256);
-        sonde_json_end(&out);
-        sonde_file_printf(file[SUMS], "%s  %s\n", c->file[i].sha256, c->file[i].path);
-      }
+      sonde_dataset_put_files(&out, &c->files);
       sonde_json_end(&out);
-      sonde_json_end(&out);
+      for (uint32_t i = 0; i < c->files.count; ++i)
+        sonde_file_printf(file[SUMS], "%s  %s\n", c->files.list[i].sha256, c->files.list[i].path);
       sonde_file_printf(file[MANIFEST], "\n");
     }
     sonde_file *memory = file[k];
@@ -161,7 +154,7 @@ sonde_status sonde_dataset_finish(const sonde_dataset_def *def, sonde_dataset_co
     status = sonde_file_take(memory, &text, &bytes, error);
     if (!status) status = sonde_dataset_save(path, text, bytes, error);
     if (!status && k < MANIFEST) {
-      sonde_dataset_sum(text, bytes, digest);
+      SHA256Data((const uint8_t *)text, bytes, digest);
       status = sonde_dataset_add_file(c, NAMES[k], bytes, digest, error);
     }
     sonde_free(text);

@@ -4,12 +4,13 @@
 
 #include "base/base.h"
 #include "base/random.h"
-#include "dataset/sha256.h"
 #include "sonde/base_json.h"
 #include "sonde/dataset.h"
 #include "sonde/echo_scanner.h"
 #include "sonde/sweep_truth.h"
 #include "sonde/trainer_setup.h"
+
+#include <sha2.h>
 
 enum { SONDE_DATASET_PATH = 4096, SONDE_DATASET_TAR_BLOCK = 512 };
 
@@ -98,8 +99,17 @@ typedef struct sonde_dataset_tally {
 typedef struct sonde_dataset_file {
   char path[80]; // below the directory
   uint64_t bytes;
-  char sha256[SONDE_SHA256_TEXT];
+  char sha256[SHA256_DIGEST_STRING_LENGTH];
 } sonde_dataset_file;
+
+typedef struct sonde_dataset_files {
+  sonde_dataset_file *list; // [count] freed by sonde_free()
+  uint32_t count, room;
+} sonde_dataset_files;
+// One more, all zero; NULL: no memory.
+sonde_dataset_file *sonde_dataset_new_file(sonde_dataset_files *files);
+// As the member "files": path, bytes and sum of each.
+void sonde_dataset_put_files(sonde_json_out *out, const sonde_dataset_files *files);
 
 // The files of one leg while they are written.
 typedef struct sonde_dataset_store {
@@ -107,11 +117,10 @@ typedef struct sonde_dataset_store {
   uint32_t leg;
   sonde_file *tar; // one open tar file
   char last[100];  // name of its last member
-  sonde_sha256 sum;
+  SHA2_CTX sum;
   uint64_t bytes;
   void *made; // of a format of the program
-  sonde_dataset_file *file;
-  uint32_t files, room;
+  sonde_dataset_files files;
 } sonde_dataset_store;
 sonde_status sonde_dataset_store_open(sonde_dataset_store *store, const sonde_dataset_def *def,
                                       uint32_t leg, sonde_error *error);
@@ -154,8 +163,7 @@ typedef struct sonde_dataset_contents {
   uint32_t legs;
   sonde_dataset_tally all;
   uint64_t bytes;
-  sonde_dataset_file *file; // freed by sonde_free()
-  uint32_t files, room;
+  sonde_dataset_files files;
 } sonde_dataset_contents;
 sonde_status sonde_dataset_add_file(sonde_dataset_contents *contents, const char *path,
                                     uint64_t bytes, const char *sha256, sonde_error *error);

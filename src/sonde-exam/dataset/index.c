@@ -14,6 +14,31 @@ static void index_path(const sonde_dataset_def *def, uint32_t leg, char path[SON
   sonde_dataset_path(def->directory, name, path);
 }
 
+sonde_dataset_file *sonde_dataset_new_file(sonde_dataset_files *f) {
+  if (f->count == f->room) {
+    const uint32_t room = f->room ? 2 * f->room : 8;
+    sonde_dataset_file *grown =
+        sonde_realloc(f->list, f->room * sizeof *f->list, room * sizeof *f->list);
+    if (!grown) return NULL;
+    f->list = grown, f->room = room;
+  }
+  sonde_dataset_file *file = &f->list[f->count++];
+  *file = (sonde_dataset_file){0};
+  return file;
+}
+
+void sonde_dataset_put_files(sonde_json_out *out, const sonde_dataset_files *files) {
+  sonde_json_begin_list(out, "files");
+  for (uint32_t k = 0; k < files->count; ++k) {
+    sonde_json_begin_object(out, NULL);
+    sonde_json_put_text(out, "path", files->list[k].path);
+    sonde_json_put_integer(out, "bytes", (int64_t)files->list[k].bytes);
+    sonde_json_put_text(out, "sha256", files->list[k].sha256);
+    sonde_json_end(out);
+  }
+  sonde_json_end(out);
+}
+
 sonde_status sonde_dataset_index_leg(const sonde_dataset_store *store,
                                      const sonde_dataset_tally *tally, sonde_error *error) {
   SONDE_ASSERT(store && store->def && tally);
@@ -37,15 +62,7 @@ sonde_status sonde_dataset_index_leg(const sonde_dataset_store *store,
   for (size_t k = 0; k < SONDE_COUNT_OF(tally->pixels); ++k)
     sonde_json_put_integer(&out, NULL, (int64_t)tally->pixels[k]);
   sonde_json_end(&out);
-  sonde_json_begin_list(&out, "files");
-  for (uint32_t k = 0; k < store->files; ++k) {
-    sonde_json_begin_object(&out, NULL);
-    sonde_json_put_text(&out, "path", store->file[k].path);
-    sonde_json_put_integer(&out, "bytes", (int64_t)store->file[k].bytes);
-    sonde_json_put_text(&out, "sha256", store->file[k].sha256);
-    sonde_json_end(&out);
-  }
-  sonde_json_end(&out);
+  sonde_dataset_put_files(&out, &store->files);
   sonde_json_end(&out);
   sonde_file_printf(file, "\n");
   return sonde_file_commit(file, error);
@@ -106,15 +123,9 @@ sonde_status sonde_dataset_keep_plan(const sonde_dataset_def *def, sonde_error *
 sonde_status sonde_dataset_add_file(sonde_dataset_contents *c, const char *path, uint64_t bytes,
                                     const char *sha256, sonde_error *error) {
   SONDE_ASSERT(path && sha256);
-  if (c->files == c->room) {
-    const uint32_t room = c->room ? 2 * c->room : 256;
-    sonde_dataset_file *grown =
-        sonde_realloc(c->file, c->room * sizeof *c->file, room * sizeof *c->file);
-    if (!grown) return sonde_fail_memory(error);
-    c->file = grown, c->room = room;
-  }
-  sonde_dataset_file *file = &c->file[c->files++];
-  *file = (sonde_dataset_file){.bytes = bytes};
+  sonde_dataset_file *file = sonde_dataset_new_file(&c->files);
+  if (!file) return sonde_fail_memory(error);
+  file->bytes = bytes;
   snprintf(file->path, sizeof file->path, "%s", path);
   snprintf(file->sha256, sizeof file->sha256, "%s", sha256);
   c->bytes += bytes;

@@ -23,15 +23,8 @@ sonde_status sonde_dataset_save(const char *path, const void *bytes, size_t coun
 // One more file of the leg, its name below the directory.
 static sonde_status new_file(sonde_dataset_store *store, const char *name, const char *end,
                              sonde_dataset_file **file, sonde_error *error) {
-  if (store->files == store->room) {
-    const uint32_t room = store->room ? 2 * store->room : 8;
-    sonde_dataset_file *grown =
-        sonde_realloc(store->file, store->room * sizeof *store->file, room * sizeof *store->file);
-    if (!grown) return sonde_fail_memory(error);
-    store->file = grown, store->room = room;
-  }
-  *file = &store->file[store->files++];
-  **file = (sonde_dataset_file){0};
+  *file = sonde_dataset_new_file(&store->files);
+  if (!*file) return sonde_fail_memory(error);
   snprintf((*file)->path, sizeof(*file)->path, "leg-%06u%s%s%s%s", store->leg % 1000000,
            name ? "/" : "", name ? name : "", end ? "." : "", end ? end : "");
   return SONDE_OK;
@@ -41,7 +34,7 @@ sonde_status sonde_dataset_store_open(sonde_dataset_store *store, const sonde_da
                                       uint32_t leg, sonde_error *error) {
   SONDE_ASSERT(store && def && def->directory);
   *store = (sonde_dataset_store){.def = def, .leg = leg};
-  sonde_sha256_begin(&store->sum);
+  SHA256Init(&store->sum);
   if (def->format) return def->format->open(&store->made, error);
   char path[SONDE_DATASET_PATH], name[32];
   snprintf(name, sizeof name, "leg-%06u%s", leg % 1000000, def->folder ? "" : ".tar");
@@ -53,7 +46,7 @@ sonde_status sonde_dataset_store_open(sonde_dataset_store *store, const sonde_da
 
 static void append(sonde_dataset_store *store, const void *bytes, size_t count) {
   sonde_file_write(store->tar, bytes, count);
-  sonde_sha256_add(&store->sum, bytes, count);
+  SHA256Update(&store->sum, bytes, count);
   store->bytes += count;
 }
 
@@ -66,7 +59,7 @@ static sonde_status put_member(sonde_dataset_store *store, const char *name, con
     sonde_status status = new_file(store, name, NULL, &file, error);
     if (status) return status;
     file->bytes = count;
-    sonde_dataset_sum(bytes, count, file->sha256);
+    SHA256Data(bytes, count, file->sha256);
     sonde_dataset_path(store->def->directory, file->path, path);
     return sonde_dataset_save(path, bytes, count, error);
   }
@@ -131,14 +124,14 @@ sonde_status sonde_dataset_store_commit(sonde_dataset_store *store, sonde_error 
     sonde_dataset_path(store->def->directory, file->path, path);
     status = def->format->bytes(store->made, &bytes, &count, error);
     if (!status) {
-      sonde_sha256_add(&store->sum, bytes, count);
+      SHA256Update(&store->sum, bytes, count);
       store->bytes = count;
       status = sonde_dataset_save(path, bytes, count, error);
     }
     free(bytes);
   }
   file->bytes = store->bytes;
-  sonde_sha256_end(&store->sum, file->sha256);
+  SHA256End(&store->sum, file->sha256);
   return status;
 }
 
@@ -146,6 +139,6 @@ void sonde_dataset_store_close(sonde_dataset_store *store) {
   if (!store->def) return;
   sonde_file_discard(store->tar);
   if (store->made) store->def->format->close(store->made);
-  sonde_free(store->file);
+  sonde_free(store->files.list);
   *store = (sonde_dataset_store){0};
 }

@@ -55,14 +55,14 @@ sonde_status sonde_dataset_write(const sonde_dataset_def *def, sonde_dataset_cou
     status = sonde_dataset_finish(def, &contents, error);
     count->whole = !status;
   }
-  sonde_free(contents.file);
+  sonde_free(contents.files.list);
   return status;
 }
 
 sonde_status sonde_dataset_verify(const char *directory, const sonde_progress *progress,
                                   uint32_t *files, sonde_error *error) {
   SONDE_ASSERT(directory && files);
-  char path[SONDE_DATASET_PATH], *text = NULL, digest[SONDE_SHA256_TEXT];
+  char path[SONDE_DATASET_PATH], *text = NULL, digest[SHA256_DIGEST_STRING_LENGTH];
   size_t bytes;
   sonde_json *root = NULL;
   *files = 0;
@@ -96,13 +96,13 @@ sonde_status sonde_dataset_verify(const char *directory, const sonde_progress *p
       status = sonde_fail(error, SONDE_IO, "%s: cannot be read", member);
       break;
     }
-    sonde_sha256 sum;
-    sonde_sha256_begin(&sum);
-    char block[1 << 14];
+    SHA2_CTX sum;
+    SHA256Init(&sum);
+    uint8_t block[1 << 14];
     for (size_t got; (got = fread(block, 1, sizeof block, file)) > 0;)
-      sonde_sha256_add(&sum, block, got);
+      SHA256Update(&sum, block, got);
     fclose(file);
-    sonde_sha256_end(&sum, digest);
+    SHA256End(&sum, digest);
     if (strcmp(digest, right) != 0)
       status = sonde_fail(error, SONDE_CHECKSUM, "%s: SHA-256 is %s, expected %s", member, digest,
                           right);

@@ -4,55 +4,18 @@
 #include "sonde/stream.h"
 
 #include <errno.h>
+#include <sha1.h>
 #include <string.h>
 #include <sys/random.h>
 
 enum { BLOCK = 64, LONGEST = 512 }; // bytes of a block; of a text that is hashed with a key
 
-static uint32_t turn(uint32_t x, int by) { return x << by | x >> (32 - by); }
-
-static void block(uint32_t h[5], const unsigned char *bytes) {
-  uint32_t w[80];
-  for (size_t i = 0; i < 16; ++i)
-    w[i] = (uint32_t)bytes[4 * i] << 24 | (uint32_t)bytes[4 * i + 1] << 16 |
-           (uint32_t)bytes[4 * i + 2] << 8 | (uint32_t)bytes[4 * i + 3];
-  for (size_t i = 16; i < 80; ++i) w[i] = turn(w[i - 3] ^ w[i - 8] ^ w[i - 14] ^ w[i - 16], 1);
-  uint32_t a = h[0], b = h[1], c = h[2], d = h[3], e = h[4];
-  for (size_t i = 0; i < 80; ++i) {
-    uint32_t f = i < 20   ? (b & c) | (~b & d)
-                 : i < 40 ? b ^ c ^ d
-                 : i < 60 ? (b & c) | (b & d) | (c & d)
-                          : b ^ c ^ d;
-    static const uint32_t K[4] = {0x5a827999, 0x6ed9eba1, 0x8f1bbcdc, 0xca62c1d6};
-    uint32_t next = turn(a, 5) + f + e + K[i / 20] + w[i];
-    e = d;
-    d = c;
-    c = turn(b, 30);
-    b = a;
-    a = next;
-  }
-  h[0] += a;
-  h[1] += b;
-  h[2] += c;
-  h[3] += d;
-  h[4] += e;
-}
-
 void page_sha1(const void *bytes, size_t count, unsigned char digest[PAGE_SHA1_BYTES]) {
   SONDE_ASSERT(bytes && digest);
-  uint32_t h[5] = {0x67452301, 0xefcdab89, 0x98badcfe, 0x10325476, 0xc3d2e1f0};
-  const unsigned char *at = bytes;
-  size_t left = count;
-  for (; left >= BLOCK; left -= BLOCK, at += BLOCK) block(h, at);
-  unsigned char last[2 * BLOCK] = {0};
-  memcpy(last, at, left);
-  last[left] = 0x80;
-  size_t size = left + 9 <= BLOCK ? BLOCK : 2 * BLOCK;
-  for (size_t i = 0; i < 8; ++i)
-    last[size - 1 - i] = (unsigned char)((uint64_t)count * 8 >> (8 * i) & 0xff);
-  for (size_t i = 0; i < size; i += BLOCK) block(h, last + i);
-  for (size_t i = 0; i < PAGE_SHA1_BYTES; ++i)
-    digest[i] = (unsigned char)(h[i / 4] >> (24 - 8 * (i % 4)) & 0xff);
+  SHA1_CTX sum;
+  SHA1Init(&sum);
+  SHA1Update(&sum, bytes, count);
+  SHA1Final(digest, &sum);
 }
 
 void page_hmac_sha1(const char *key, const char *text, unsigned char digest[PAGE_SHA1_BYTES]) {
