@@ -20,6 +20,11 @@ SONDE_API sonde_scanner sonde_scanner_plain(void);
  *  @return IO, FORMAT, VERSION, ARGUMENT with the line @thread owner */
 SONDE_API sonde_status sonde_scanner_load(const char *path, sonde_scanner *scanner, char *title,
                                           size_t size, sonde_error *error);
+/** The scanner of a name: "plain", one of a directory (NAME.yaml there), or a file, whose name has
+ * a dot or a slash. @param directory NULL: the working directory
+ *  @return NOT_FOUND; as sonde_scanner_load() @thread owner */
+SONDE_API sonde_status sonde_scanner_find(const char *name, const char *directory,
+                                          sonde_scanner *scanner, sonde_error *error);
 /** Writes a scanner atomically, all numbers. @param title one line, UTF-8 @return IO, DISK
  *  @thread owner */
 SONDE_API sonde_status sonde_scanner_save(const sonde_scanner *scanner, const char *title,

@@ -4,7 +4,6 @@
 #include "sonde/files_scanner.h"
 
 #include <string.h>
-#include <unistd.h>
 
 static const double CLEAR_M = 0.01; // between the face and the skin at the start of a press
 static const double EDGE = 0.03;    // share of the vein that is left out at either end
@@ -62,19 +61,7 @@ sonde_status sonde_dataset_draw_leg(const sonde_dataset_plan *plan, uint32_t leg
 sonde_status sonde_dataset_scanner(const sonde_dataset_def *def, uint32_t which,
                                    sonde_scanner *scanner, sonde_error *error) {
   SONDE_ASSERT(def && which < def->plan->scanner_count && scanner);
-  const char *name = def->plan->scanner[which];
-  const bool file = strchr(name, '/') || strchr(name, '.');
-  char path[SONDE_DATASET_PATH];
-  *scanner = sonde_scanner_plain();
-  if (strcmp(name, "plain") == 0) return SONDE_OK;
-  if (file) return sonde_scanner_load(name, scanner, NULL, 0, error);
-  snprintf(path, sizeof path, "%.3800s/%.200s.yaml", def->scanners ? def->scanners : ".", name);
-  if (access(path, R_OK) != 0)
-    return sonde_fail(error, SONDE_NOT_FOUND,
-                      "no scanner '%s', expected plain, the name of one that ships, or a file with "
-                      "a dot or a slash in its name",
-                      name);
-  return sonde_scanner_load(path, scanner, NULL, 0, error);
+  return sonde_scanner_find(def->plan->scanner[which], def->scanners, scanner, error);
 }
 
 // A pose moved along one of its own axes.
@@ -82,11 +69,6 @@ static sonde_pose moved(sonde_pose pose, int axis, double by_m) {
   const sonde_mat3 axes = q_matrix(pose.rotation);
   pose.position = v_madd(pose.position, by_m, m_column(&axes, axis));
   return pose;
-}
-
-static sonde_quat about(int axis, double rad) {
-  const double s = sin(0.5 * rad);
-  return (sonde_quat){cos(0.5 * rad), axis == 0 ? s : 0, axis == 1 ? s : 0, axis == 2 ? s : 0};
 }
 
 sonde_status sonde_dataset_draw_press(const sonde_dataset_def *def, uint32_t leg, uint32_t number,
@@ -119,10 +101,11 @@ sonde_status sonde_dataset_draw_press(const sonde_dataset_def *def, uint32_t leg
   const double turn_rad = plan->turn_rad * sonde_random_normal(hand, 3);
   const double shift_m = press->along ? 0 : plan->shift_m * sonde_random_normal(hand, 0);
   pose = moved(pose, 0, shift_m);
-  pose.rotation = q_mul(pose.rotation, about(2, turn_rad + (press->along ? SONDE_PI / 2 : 0)));
+  pose.rotation = q_mul(pose.rotation, q_about(2, turn_rad + (press->along ? SONDE_PI / 2 : 0)));
   for (int axis = 0; axis < 2; ++axis)
-    pose.rotation = q_mul(
-        pose.rotation, about(axis, plan->tilt_rad * sonde_random_normal(hand, 1 + (uint64_t)axis)));
+    pose.rotation =
+        q_mul(pose.rotation,
+              q_about(axis, plan->tilt_rad * sonde_random_normal(hand, 1 + (uint64_t)axis)));
   pose.rotation = q_unit(pose.rotation);
   press->start = moved(pose, 2, -CLEAR_M);
   press->force_n = between(force, 0, plan->force_low_n, plan->force_high_n);

@@ -197,11 +197,9 @@ static sonde_pose pose_at(const sonde_operator *op) {
   double angle = start + t * turn, out_m = near_m + t * (far_m - near_m) + arch;
   sonde_vec3 out = vec3(out_m * cos(angle), out_m * sin(angle), 0);
   // The beam keeps looking at the leg: the probe turns with the direction, the rest evenly.
-  sonde_quat all = {cos(0.5 * turn), 0, 0, sin(0.5 * turn)};
-  sonde_quat part = {cos(0.5 * t * turn), 0, 0, sin(0.5 * t * turn)};
-  sonde_quat goal = q_mul(q_conj(all), there.rotation);
+  sonde_quat goal = q_mul(q_conj(q_about(2, turn)), there.rotation);
   return (sonde_pose){v_add(middle_at(&op->map, z_m), out),
-                      q_mul(part, sonde_quat_slerp(op->left.rotation, goal, t))};
+                      q_mul(q_about(2, t * turn), sonde_quat_slerp(op->left.rotation, goal, t))};
 }
 
 // The next place that is visited, or the end. Between two places of the main vein the hand goes

@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { MOST_KEYS = 64 };
 
@@ -62,6 +63,23 @@ sonde_status sonde_scanner_load(const char *path, sonde_scanner *scanner, char *
   sonde_reader_destroy(reader);
   sonde_free(text);
   return status;
+}
+
+sonde_status sonde_scanner_find(const char *name, const char *directory, sonde_scanner *scanner,
+                                sonde_error *error) {
+  SONDE_ASSERT(name && scanner);
+  char path[5120];
+  *scanner = sonde_scanner_plain();
+  if (strcmp(name, "plain") == 0) return SONDE_OK;
+  if (strchr(name, '/') || strchr(name, '.'))
+    return sonde_scanner_load(name, scanner, NULL, 0, error);
+  snprintf(path, sizeof path, "%.4800s/%.256s.yaml", directory ? directory : ".", name);
+  if (access(path, R_OK) != 0)
+    return sonde_fail(error, SONDE_NOT_FOUND,
+                      "no scanner '%s', expected plain, the name of one that ships, or a file with "
+                      "a dot or a slash in its name",
+                      name);
+  return sonde_scanner_load(path, scanner, NULL, 0, error);
 }
 
 sonde_status sonde_scanner_save(const sonde_scanner *scanner, const char *title, const char *path,

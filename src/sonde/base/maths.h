@@ -113,6 +113,11 @@ static inline sonde_quat q_mul(sonde_quat a, sonde_quat b) {
       a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
       a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
+// A turn about axis 0, 1 or 2.
+static inline sonde_quat q_about(int axis, double angle_rad) {
+  const double c = cos(0.5 * angle_rad), s = sin(0.5 * angle_rad);
+  return (sonde_quat){c, axis == 0 ? s : 0, axis == 1 ? s : 0, axis == 2 ? s : 0};
+}
 static inline sonde_quat q_conj(sonde_quat a) { return (sonde_quat){a.w, -a.x, -a.y, -a.z}; }
 static inline sonde_quat q_unit(sonde_quat a) {
   double n = sqrt(a.w * a.w + a.x * a.x + a.y * a.y + a.z * a.z);
