@@ -3,7 +3,6 @@
 
 #include "base/maths.h"
 
-#include <stdarg.h>
 #include <string.h>
 
 static const double REACH_MM = 2000; // farthest goal from the model's origin
@@ -15,14 +14,7 @@ typedef struct reader {
   sonde_error *error;
 } reader;
 
-__attribute__((format(printf, 2, 3))) static void refuse(reader *r, const char *format, ...) {
-  char sentence[160];
-  va_list arguments;
-  va_start(arguments, format);
-  vsnprintf(sentence, sizeof sentence, format, arguments);
-  va_end(arguments);
-  if (!r->status) r->status = sonde_fail(r->error, SONDE_ARGUMENT, "%s", sentence);
-}
+#define refuse(r, ...) sonde_fail_once((r)->status, (r)->error, SONDE_ARGUMENT, __VA_ARGS__)
 
 // A number within a range; `absent` when there is none of that key.
 static double read_real(reader *r, const char *key, double low, double high, double absent) {
@@ -136,13 +128,12 @@ static void read_controls(reader *r, page_command *command) {
   command->damping_scale = read_real(r, "damping_scale", 0.25, 4, absent);
   command->friction_scale = read_real(r, "friction_scale", 0, 2, absent);
   // Colour.
-  static const char *const SHOWN[] = {"off", "velocity", "power"};
   const double reach_mm = 250;
   char shown[16];
   read_name(r, "colour", shown, sizeof shown);
   command->colour = -1;
-  for (int k = 0; k < (int)SONDE_COUNT_OF(SHOWN); ++k)
-    if (strcmp(shown, SHOWN[k]) == 0) command->colour = k;
+  for (int k = 0; k < PAGE_COLOURS; ++k)
+    if (strcmp(shown, page_colour_word[k]) == 0) command->colour = k;
   if (shown[0] && command->colour < 0) refuse(r, "\"colour\" must be off, velocity or power");
   double *box = command->colour_box_m;
   const bool boxed = sonde_json_member(r->root, "colour_box_mm") != NULL;

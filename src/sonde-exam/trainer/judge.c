@@ -3,9 +3,9 @@
 
 #include <string.h>
 
-// A press begins above this force, when it has risen by this much since the last; it ends below a
-// share of its peak.
-static const double BEGIN_N = 3, RISE_N = 2, END_SHARE = 0.5, END_N = 1.5;
+// A press begins when the force has risen by this much since the last; it ends below a share of its
+// peak.
+static const double RISE_N = 2, END_SHARE = 0.5, END_N = 1.5;
 static const double LONGEST_STEP_S = 0.5; // snapshots further apart leave time that is not counted
 
 static const char *const RESULT[] = {"complete", "open", "insufficient", "too_hard", "off_axis"};

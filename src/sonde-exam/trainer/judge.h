@@ -12,6 +12,8 @@ static const double JUDGE_BIN_M = 0.0005, FORCE_BIN_N = 0.25;
 static const double COVER_EXTRA_M = 0.0025;
 // Lighter contact than this is not pressing.
 static const double CONTACT_N = 1.0;
+// A press begins at this force.
+static const double BEGIN_N = 3;
 
 // The probe's path on a fixed grid of time, whatever the rate of the snapshots.
 typedef struct sonde_motion {

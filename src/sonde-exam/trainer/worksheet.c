@@ -3,16 +3,12 @@
 #include "sonde/trainer_worksheet.h"
 
 #include "sonde/limb_model.h"
-#include "trainer/trainer.h"
+#include "trainer/judge.h"
 
-#include <stdarg.h>
 #include <string.h>
 
 enum { DEPTH = 3 }; // of lists and objects in an entry
 static const double TICKS_MOST = 9007199254740992.0, REFLUX_MOST_S = 20, PICTURE_MOST_MM = 400;
-// A press begins at this force: a picture under it is one without compression, unless the entry
-// says otherwise.
-static const double COMPRESSES_N = 3;
 
 static const char *const WORD[SONDE_SHEET_LISTS][7] = {
     [SONDE_SHEET_FINDINGS] = {"", "compressible", "partly", "not_compressible", "not_seen"},
@@ -69,14 +65,7 @@ typedef struct entry {
   sonde_error *error;
 } entry;
 
-__attribute__((format(printf, 2, 3))) static void refuse(entry *e, const char *format, ...) {
-  char sentence[160];
-  va_list arguments;
-  va_start(arguments, format);
-  vsnprintf(sentence, sizeof sentence, format, arguments);
-  va_end(arguments);
-  if (!e->status) e->status = sonde_fail(e->error, SONDE_ARGUMENT, "%s", sentence);
-}
+#define refuse(e, ...) sonde_fail_once((e)->status, (e)->error, SONDE_ARGUMENT, __VA_ARGS__)
 
 static bool has(const entry *e, const char *key) { return sonde_json_member(e->root, key) != NULL; }
 
@@ -195,7 +184,8 @@ static void enter_picture(entry *e, sonde_worksheet *sheet, sonde_sheet_look loo
   if (fresh && (!look || !look(user, (uint64_t)number, &next))) {
     refuse(e, "this picture is too old to be stored: freeze it when it is seen, or store it then");
   } else if (fresh) {
-    if (!has(e, "view")) next.compressed = next.force_n >= COMPRESSES_N;
+    // A picture at less than a press's force is one without compression.
+    if (!has(e, "view")) next.compressed = next.force_n >= BEGIN_N;
     e->status = sonde_worksheet_store(sheet, &next, e->error);
   } else {
     sheet->picture[k] = next;

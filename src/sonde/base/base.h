@@ -45,6 +45,9 @@ SONDE_LINK sonde_status sonde_fail_at(sonde_error *error, sonde_status status, c
                                       const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 #define sonde_fail(error, status, ...) sonde_fail_at((error), (status), __func__, __VA_ARGS__)
+// As sonde_fail() into `status`, unless it holds an earlier failure, which stays.
+#define sonde_fail_once(status, error, failure, ...)                                               \
+  ((status) = (status) ? (status) : sonde_fail((error), (failure), __VA_ARGS__))
 #define sonde_fail_memory(error)                                                                   \
   sonde_fail_at((error), SONDE_MEMORY, __func__, "out of memory in %s", __func__)
 
@@ -53,6 +56,9 @@ typedef struct sonde_bounded {
   const char *name;
   double value, low, high;
 } sonde_bounded;
+static inline bool sonde_bounded_holds(sonde_bounded number) {
+  return number.value >= number.low && number.value <= number.high;
+}
 // @return ARGUMENT "<name> is <value>, expected <low> to <high>" for the first of `count` numbers
 // that is not within its range, or no number at all
 SONDE_LINK sonde_status sonde_bounded_check(const sonde_bounded *numbers, size_t count,

@@ -38,7 +38,7 @@ sonde_status sonde_fail_at(sonde_error *error, sonde_status status, const char *
 sonde_status sonde_bounded_check(const sonde_bounded *numbers, size_t count, sonde_error *error) {
   SONDE_ASSERT(numbers != NULL || count == 0);
   for (size_t k = 0; k < count; ++k)
-    if (!(numbers[k].value >= numbers[k].low && numbers[k].value <= numbers[k].high))
+    if (!sonde_bounded_holds(numbers[k]))
       return sonde_fail(error, SONDE_ARGUMENT, "%s is %g, expected %g to %g", numbers[k].name,
                         numbers[k].value, numbers[k].low, numbers[k].high);
   return SONDE_OK;
