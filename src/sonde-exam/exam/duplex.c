@@ -22,10 +22,7 @@ sonde_status sonde_duplex_create(const sonde_model *model, const sonde_interior 
   sonde_flow_def_hold(sonde_limb_pose_of(model), &body);
   d->cells = SONDE_NEW(sonde_colour_cell, SONDE_COLOUR_CELLS);
   sonde_status status = d->cells ? SONDE_OK : sonde_fail_memory(error);
-  // A colour's numbers follow the controls; what the persistence is at 50 images a second is set by
-  // eye.
-  sonde_colour_def colour = sonde_colour_def_default();
-  colour.persistence = 0.7;
+  const sonde_colour_def colour = sonde_colour_def_default(); // drawing tunes it
   if (!status) status = sonde_colour_create(&colour, &d->colour, error);
   if (!status) status = sonde_flow_scene_create(limb, interior, &d->scene, error);
   if (!status) status = sonde_flow_start(&body, &d->body, error);
@@ -49,7 +46,7 @@ sonde_duplex_controls sonde_duplex_clean(const sonde_duplex_controls *wanted,
   SONDE_ASSERT(wanted && before);
   sonde_duplex_controls c = *wanted;
   if ((unsigned)c.shown > SONDE_DUPLEX_POWER) c.shown = before->shown;
-  const double least_m = 4e-3;
+  const double least_m = sonde_duplex_least_m;
   const struct {
     double *to, from, low, high;
   } NUMBER[] = {{&c.box.left_m, before->box.left_m, -0.1, 0.1 - least_m},

@@ -90,14 +90,14 @@ void sonde_duplex_draw(sonde_duplex *d, const sonde_duplex_moment *now, const so
   if (!d->flows) return;
   // The box within the picture, and pulses as far apart as the scale wants and the depth allows.
   sonde_colour_box box = c->box;
-  const double least_m = 4e-3, half_m = 0.5 * image->width_m;
+  const double least_m = sonde_duplex_least_m, half_m = 0.5 * image->width_m;
   box.left_m = clamp(box.left_m, -half_m, half_m - least_m);
   box.right_m = clamp(box.right_m, box.left_m + least_m, half_m);
   box.top_m = clamp(box.top_m, 0, image->height_m - least_m);
   box.bottom_m = clamp(box.bottom_m, box.top_m + least_m, image->height_m);
   sonde_colour_def def = sonde_colour_def_default();
   const double highest_hz = 5e6, sound_m_s = 1540, most_hz = sound_m_s / (2 * box.bottom_m);
-  def.frequency_hz = fmin(frequency_hz, highest_hz), def.persistence = 0.7;
+  def.frequency_hz = fmin(frequency_hz, highest_hz), def.persistence = sonde_duplex_persistence;
   def.pulse_hz =
       clamp(def.pulse_hz * c->scale_m_s / sonde_colour_limit(&def), 100, fmin(most_hz, 2e4));
   if (!sonde_colour_tune(d->colour, &def)) return;

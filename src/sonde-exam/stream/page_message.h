@@ -68,6 +68,10 @@ typedef struct page_hidden {
   bool posture;   // the model says how it is held
 } page_hidden;
 
+// A sonde_duplex_shown in messages.
+enum { PAGE_COLOURS = 3 };
+static const char *const page_colour_word[PAGE_COLOURS] = {"off", "velocity", "power"};
+
 // Each writer puts one message onto a text in memory.
 void page_write_hello(sonde_json_out *out, const page_hello *hello);
 // @param gel_m3 on the skin

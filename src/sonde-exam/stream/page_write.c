@@ -153,11 +153,10 @@ void page_write_controls(sonde_json_out *out, const sonde_session_controls *cont
   sonde_json_put_bool(out, "gel", controls->gel);
   put_real(out, "gel_ml", gel_m3 * 1e6);
   // Colour over the image.
-  static const char *const SHOWN[] = {"off", "velocity", "power"};
   const sonde_duplex_controls *duplex = &controls->duplex;
   const double *box_m = &duplex->box.left_m;
   SONDE_ASSERT(duplex->shown <= SONDE_DUPLEX_POWER);
-  sonde_json_put_text(out, "colour", SHOWN[duplex->shown]);
+  sonde_json_put_text(out, "colour", page_colour_word[duplex->shown]);
   sonde_json_begin_list(out, "colour_box_mm");
   for (int k = 0; k < 4; ++k) put_real(out, NULL, box_m[k] * 1e3);
   sonde_json_end(out);

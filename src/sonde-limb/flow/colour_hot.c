@@ -8,6 +8,11 @@
 
 enum { LINES = SONDE_COLOUR_LINES, ROWS = SONDE_COLOUR_ROWS };
 
+// What a cell's loss leaves of its amplitude.
+static float amplitude_of(const sonde_colour_cell *cell) {
+  return cell->loss_db > 0 ? powf(10, -cell->loss_db / 20) : 1;
+}
+
 // Echoes of blood in its cells: patterns that turn with the motion along the beam and are renewed
 // as blood crosses it.
 void colour_begin_blood(sonde_colour *c, const sonde_colour_cell *cells, uint32_t *drawn) {
@@ -24,7 +29,7 @@ void colour_begin_blood(sonde_colour *c, const sonde_colour_cell *cells, uint32_
     // A Gaussian beam that blood crosses by d keeps exp(-d^2/4 sigma^2) of its pattern.
     const double crossed = (double)cells[i].across_m_s / def->pulse_hz / def->beam_m;
     c->keep[b] = (float)exp(-0.25 * crossed * crossed);
-    c->loss[b] = cells[i].loss_db > 0 ? powf(10, -cells[i].loss_db / 20) : 1;
+    c->loss[b] = amplitude_of(&cells[i]);
     for (int k = 0; k < 2; ++k) c->pattern[b][k] = c->normal[(*drawn)++ % COLOUR_NORMALS];
   }
 }
@@ -70,7 +75,7 @@ void colour_begin_echoes(sonde_colour *c, const sonde_colour_cell *cells, uint32
   bool moves = false;
   for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i) {
     const bool solid = cells[i].vessel == SONDE_COLOUR_NO_VESSEL;
-    const float loss = cells[i].loss_db > 0 ? powf(10, -cells[i].loss_db / 20) : 1;
+    const float loss = amplitude_of(&cells[i]);
     for (int k = 0; k < 2; ++k) tissue[k][i] = solid ? loss * clutter * still[k][i] : 0;
     c->drift[0][i] = 1, c->drift[1][i] = 0;
     if (!solid || cells[i].towards_m_s == 0) continue;
