@@ -7,7 +7,7 @@
 
 #include "sonde/exam_journal.h"
 #include "sonde/echo.h"
-#include "sonde/flow_colour.h"
+#include "sonde/flow_gate.h"
 #include "sonde/haptics_render.h"
 #include "sonde/identify.h"
 #include "sonde/interior_findings.h"
@@ -30,8 +30,10 @@ typedef struct sonde_duplex_controls {
   double scale_m_s;     /**< velocity along the beam from which colour folds, 0.01 to 1; less where
                              the pulses' way to the box and back takes longer */
   double gain_db;       /**< -30 to 20 */
+  bool gated;           /**< pulsed Doppler is on */
+  sonde_gate_settings gate;
 } sonde_duplex_controls;
-/** Off; a box of 28 mm by 30 mm, 6 cm/s, 0 dB. @thread any */
+/** Off; a box of 28 mm by 30 mm, 6 cm/s, 0 dB; the usual gate. @thread any */
 SONDE_API sonde_duplex_controls sonde_duplex_controls_default(void);
 
 /** What changes a session besides the probe's pose; applied at the start of a tick. */
@@ -198,6 +200,7 @@ struct sonde_frame {
   uint32_t width, height;
   double width_m, height_m;
   sonde_frame_colour colour;
+  sonde_gate_spectrum spectrum; /**< its columns belong to the frame */
 };
 /** Newest frame since the last call, false when nothing is new; the pointers stay valid until the
  *  next call. @thread any, one reader */

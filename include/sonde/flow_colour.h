@@ -129,7 +129,7 @@ SONDE_API void sonde_flow_scene_run(sonde_flow_scene *scene, sonde_flow *flow, d
 /** All that the next run goes on from. */
 typedef struct sonde_flow_scene_memory {
   sonde_flow flow; /**< as the last run left it */
-  double profile_m_s[SONDE_FLOW_SEGMENTS][SONDE_FLOW_RINGS];
+  double profile_m_s[SONDE_FLOW_SEGMENTS][SONDE_FLOW_RINGS], artery_m_s[SONDE_FLOW_RINGS];
 } sonde_flow_scene_memory;
 /** @thread owner; no allocation */
 SONDE_API sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_scene *scene);

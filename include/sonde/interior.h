@@ -152,9 +152,11 @@ typedef struct sonde_circulation {
   double heart_rate_hz, systolic_pa, diastolic_pa;
   double breath_rate_hz, breath_pa;                   /**< half swing of the venous pressure */
   double valsalva_from_s, valsalva_to_s, valsalva_pa; /**< a strain and its plateau; none: equal */
+  double valve_leak; /**< what the veins' valves leave open to blood that falls back, 0 to 1 */
 } sonde_circulation;
 
-/** 1.1 Hz, 120/80 mmHg, 0.25 Hz with 1.5 mmHg, no Valsalva (20 mmHg when timed). @thread any */
+/** 1.1 Hz, 120/80 mmHg, 0.25 Hz with 1.5 mmHg, no Valsalva (20 mmHg when timed), sound valves.
+ *  @thread any */
 SONDE_API sonde_circulation sonde_circulation_default(void);
 /** Begins or ends a strain at time t, from whatever share of one is in force: the pressure has no
  *  step. @thread any */

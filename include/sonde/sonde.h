@@ -43,6 +43,7 @@
 #include "sonde/solid.h"
 #include "sonde/flow.h"
 #include "sonde/flow_colour.h"
+#include "sonde/flow_gate.h"
 #include "sonde/limb.h"
 #include "sonde/limb_model.h"
 #include "sonde/limb_pose.h"

@@ -266,7 +266,12 @@ static void controls_survive_the_bytes(void **state) {
   c.stiffness_scale = 1.0 / 0.7, c.damping_scale = 1.0 / 3.0, c.friction_scale = 0.1;
   c.pathology.wall_shear_pa = 12345.678;
   c.squeeze = 5, c.deep_breath = 6;
-  c.duplex = (sonde_duplex_controls){SONDE_DUPLEX_POWER, {-0.01, 0.012, 0.004, 0.04, 0.1}, 0.25, 3};
+  c.duplex = (sonde_duplex_controls){SONDE_DUPLEX_POWER,
+                                     {-0.01, 0.012, 0.004, 0.04, 0.1},
+                                     0.25,
+                                     3,
+                                     true,
+                                     {-3e-3, 0.02, 2e-3, -0.3, 0.8, 0.5, -0.25, 100, 6}};
   unsigned char bytes[SONDE_RECORD_MOST_BYTES];
   bytes_cursor w = {bytes, sizeof bytes, 0};
   sonde_controls_put(&w, &c);
@@ -278,12 +283,17 @@ static void controls_survive_the_bytes(void **state) {
   assert_int_equal(back.duplex.shown, c.duplex.shown);
   assert_memory_equal(&back.duplex.box, &c.duplex.box, sizeof c.duplex.box);
   assert_true(back.duplex.scale_m_s == c.duplex.scale_m_s);
-  assert_true(back.duplex.gain_db == c.duplex.gain_db);
+  assert_true(back.duplex.gain_db == c.duplex.gain_db && back.duplex.gated);
+  assert_memory_equal(&back.duplex.gate, &c.duplex.gate, sizeof c.duplex.gate);
   assert_memory_equal(&back.pathology, &c.pathology, sizeof c.pathology);
   assert_true(back.gel && back.valsalva && back.gel_put == 3 && back.gel_wipe == 4);
   assert_true(back.preset == 1 && back.posture == SONDE_POSTURE_STANDING);
   assert_true(back.stiffness_scale == c.stiffness_scale);
   assert_true(back.damping_scale == c.damping_scale && back.friction_scale == c.friction_scale);
+  r.at = bytes;
+  sonde_controls_get(&r, 9, &back);
+  assert_int_equal(r.at - bytes, 280);
+  assert_true(back.squeeze == 5 && !back.duplex.gated && back.duplex.gate.z_m == 0.02);
   r.at = bytes;
   sonde_controls_get(&r, 8, &back);
   assert_int_equal(r.at - bytes, 208);
@@ -364,6 +374,78 @@ static void colour_follows_blood_and_hand(void **state) {
   close_session(session);
 }
 
+// Velocity along the beam over the columns that come in so many images: mean, and farthest from 0.
+typedef struct course {
+  double mean, most;
+  uint32_t columns;
+} course;
+
+static course hear(sonde_session *session, uint32_t images) {
+  course c = {0};
+  uint64_t seen = UINT64_MAX;
+  for (uint32_t k = 0; k < images; ++k) {
+    const sonde_frame frame = run(session, 20);
+    const sonde_gate_spectrum *heard = &frame.spectrum;
+    for (uint32_t n = 0; heard->on && n < heard->count; ++n) {
+      const sonde_gate_column *column = &heard->column[n];
+      const double mean = (double)column->mean_m_s;
+      if (seen == UINT64_MAX) seen = heard->column[heard->count - 1].number;
+      if (column->number <= seen) continue;
+      seen = column->number, ++c.columns, c.mean += mean;
+      if (fabs(mean) > fabs(c.most)) c.most = mean;
+    }
+  }
+  c.mean /= fmax(c.columns, 1);
+  return c;
+}
+
+// A gate in the vein hears its blood, a column each hundredth of a second; a squeeze speeds it up,
+// in a clot and beside the vein there is none.
+static void a_gate_hears_blood_and_hand(void **state) {
+  sonde_site site = barrel_site();
+  site.u = vec3(0, 0, 1), site.v = vec3(0, -1, 0);
+  const sonde_script_key keys[] = {{0, sonde_site_pose(&site, -0.002)},
+                                   {0.1, sonde_site_pose(&site, 0.003)}};
+  sonde_device device;
+  assert_int_equal(sonde_device_script(keys, 2, 1e-3, &device, NULL), SONDE_OK);
+  sonde_session_def def = small_def(*state);
+  def.circulate = true;
+  def.controls.echo.depth_m = 0.05;
+  def.controls.duplex.gated = true;
+  sonde_session *session = open_session(&def, device);
+  sonde_frame frame = run(session, 200);
+  sonde_vessel_state vein;
+  const sonde_pose across = {
+      frame.snapshot.world_from_probe.position,
+      q_mul(frame.snapshot.world_from_probe.rotation, (sonde_quat){sqrt(0.5), 0, 0, sqrt(0.5)})};
+  assert_true(sonde_interior_vessel_at_plane(session->interior, 0, across, &vein));
+  const sonde_vec3 at = pose_apply_inverse(frame.snapshot.world_from_probe, vein.centre_m);
+  sonde_session_controls c = sonde_session_controls_now(session);
+  c.duplex.gate.x_m = at.x, c.duplex.gate.z_m = at.z, c.duplex.gate.steer_rad = 0.35;
+  c.duplex.gate.scale_m_s = 0.6, set(session, c);
+  run(session, 200);
+  const course rest = hear(session, 20);
+  ++c.squeeze, set(session, c);
+  const course squeezed = hear(session, 60);
+  c.duplex.gate.z_m += 0.015, set(session, c);
+  run(session, 100);
+  const course beside = hear(session, 10);
+  c.duplex.gate.z_m -= 0.015;
+  assert_int_equal(sonde_pathology_preset("acute_occlusive", &c.pathology, NULL), SONDE_OK);
+  set(session, c);
+  run(session, 200);
+  const course clot = hear(session, 10);
+  print_message(
+      "rest %.1f cm/s along the beam in %u columns, squeezed %.1f, beside %.2f, clot %.2f\n",
+      100 * rest.mean, rest.columns, 100 * squeezed.most, 100 * beside.mean, 100 * clot.mean);
+  assert_true(rest.columns >= 36 && fabs(rest.mean) > 0.01);
+  assert_true(squeezed.most / rest.mean > 2 && beside.mean == 0 && clot.mean == 0);
+  c.duplex.gated = false, set(session, c);
+  frame = run(session, 40);
+  assert_false(frame.spectrum.on);
+  close_session(session);
+}
+
 static sonde_json *written_and_read(const sonde_setup *setup) {
   sonde_json_out out = {.layout = SONDE_JSON_COMPACT};
   sonde_json *root = NULL;
@@ -390,12 +472,14 @@ static void setup_survives_the_header(void **state) {
   setup.circulate = true;
   setup.circulation.heart_rate_hz = 1.7;
   setup.circulation.posture = SONDE_POSTURE_SITTING;
+  setup.circulation.valve_leak = 1.0 / 3.0;
   sonde_json *read = written_and_read(&setup);
   assert_true(sonde_setup_read(read, &back));
   assert_memory_equal(&back.friction, &setup.friction, sizeof back.friction);
   assert_int_equal(back.circulation.posture, setup.circulation.posture);
   assert_true(back.circulation.heart_rate_hz == setup.circulation.heart_rate_hz);
   assert_true(back.circulation.breath_pa == setup.circulation.breath_pa);
+  assert_true(back.circulation.valve_leak == setup.circulation.valve_leak);
   sonde_session_def def = sonde_session_def_default();
   sonde_setup_apply(&back, &def);
   sonde_setup again = sonde_setup_of(&def);
@@ -461,6 +545,7 @@ int main(void) {
       cmocka_unit_test(recording_keeps_the_patient),
       cmocka_unit_test(controls_survive_the_bytes),
       cmocka_unit_test(colour_follows_blood_and_hand),
+      cmocka_unit_test(a_gate_hears_blood_and_hand),
       cmocka_unit_test(setup_survives_the_header),
       cmocka_unit_test(moments_are_kept),
   };

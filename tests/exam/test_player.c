@@ -15,7 +15,7 @@ enum { MOST = 400 };
 
 // Hash of each image that a session showed, with its tick and forces.
 typedef struct seen {
-  uint32_t count;
+  uint32_t count, columns; // images; columns of the spectrum in them
   uint64_t tick[MOST], hash[MOST], colour[MOST];
   sonde_snapshot snapshot[MOST];
 } seen;
@@ -34,7 +34,10 @@ static int tear_down(void **state) {
 
 static uint64_t colour_of(const sonde_frame *frame) {
   const sonde_colour_overlay *over = &frame->colour.over;
-  return frame->colour.shown ? sonde_hash(1, over->pixels, (size_t)over->width * over->height) : 0;
+  const sonde_gate_spectrum *heard = &frame->spectrum;
+  if (!frame->colour.shown) return 0;
+  const uint64_t hash = sonde_hash(1, over->pixels, (size_t)over->width * over->height);
+  return heard->on ? sonde_hash(hash, heard->column, heard->count * sizeof *heard->column) : hash;
 }
 
 static void look(sonde_session *session, seen *s) {
@@ -43,11 +46,12 @@ static void look(sonde_session *session, seen *s) {
   s->tick[s->count] = frame.snapshot.tick;
   s->snapshot[s->count] = frame.snapshot;
   s->colour[s->count] = colour_of(&frame);
+  s->columns += frame.spectrum.on ? frame.spectrum.count : 0;
   s->hash[s->count++] = sonde_hash(0, frame.pixels, (size_t)frame.width * frame.height);
 }
 
-// Colour, a squeeze, another case, another probe, other settings of the beam and back, while it
-// runs.
+// Colour, a gate, a squeeze, another case, another probe, other settings of the beam and back,
+// while it runs.
 static void change_controls(sonde_session *session, uint64_t tick) {
   sonde_session_controls c = sonde_session_controls_now(session);
   if (tick == 200) c.duplex.shown = SONDE_DUPLEX_VELOCITY;
@@ -57,7 +61,10 @@ static void change_controls(sonde_session *session, uint64_t tick) {
     assert_int_equal(sonde_pathology_preset("chronic", &c.pathology, NULL), SONDE_OK);
   if (tick == 800) c.probe = 2;
   if (tick == 700) c.duplex.scale_m_s = 0.1, ++c.deep_breath;
-  if (tick == 200 || tick == 330 || tick == 500 || tick == 610 || tick == 700 || tick == 800)
+  if (tick == 260) c.duplex.gated = true;
+  if (tick == 560) c.duplex.gate.x_m = 2e-3, c.duplex.gate.baseline = 0.25;
+  if (tick == 200 || tick == 260 || tick == 330 || tick == 560 || tick == 500 || tick == 610 ||
+      tick == 700 || tick == 800)
     sonde_session_control(session, &c);
 }
 
@@ -106,6 +113,7 @@ static void played_through_it_shows_the_same(void **state) {
   static seen s;
   record(*state, 1000, &s);
   assert_int_equal(s.count, 50);
+  assert_true(s.columns > 20);
   sonde_player *player = open_player(*state, false, true);
   assert_int_equal(sonde_player_info(player)->images, s.count);
   for (uint32_t i = 0; i < s.count; ++i) {
@@ -374,9 +382,9 @@ static void the_controls_are_told(void **state) {
   record(*state, 900, &s);
   sonde_player *player = open_player(*state, false, true);
   const sonde_player_event *events = player->events;
-  assert_int_equal(player->event_count, 7);
-  assert_true(events[0].time_s == 0 && fabs(events[4].time_s - 0.61) < 1e-9);
-  assert_true(events[4].controls.pathology.thrombus_fraction == 1);
+  assert_int_equal(player->event_count, 9);
+  assert_true(events[0].time_s == 0 && fabs(events[6].time_s - 0.61) < 1e-9);
+  assert_true(events[6].controls.pathology.thrombus_fraction == 1);
   assert_int_equal(sonde_player_seek(player, 0.4, NULL, NULL), SONDE_OK);
   assert_true(sonde_player_controls(player).echo.frequency_hz == 5e6);
   assert_int_equal(sonde_player_seek(player, 0.85, NULL, NULL), SONDE_OK);

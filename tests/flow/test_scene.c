@@ -1,6 +1,6 @@
 // The network's flow in the vessels of a leg: conserved in the cells of a box, less in a vein that
 // is pressed, none in one that is closed or filled with clot.
-#include "sonde/flow_colour.h"
+#include "sonde/flow_gate.h"
 
 #include "fixture.h"
 #include "interior/tube.h"
@@ -18,14 +18,14 @@ typedef struct leg {
   sonde_vec3 *still;
 } leg;
 
-static leg open_leg(void) {
-  leg l = {.t = tube_create(radius, 0.014, length, 0.012, 96, 60)};
-  assert_int_equal(sonde_interior_create(&l.t.model, &l.in, NULL), SONDE_OK);
-  sonde_interior_set_method(l.in, SONDE_INTERIOR_COLUMNS);
-  l.still = SONDE_NEW(sonde_vec3, l.t.model.surface.vertex_count);
-  l.pose = tube_pose(radius, length / 2);
-  assert_int_equal(sonde_echo_create(l.in, NULL, &l.echo, NULL), SONDE_OK);
-  return l;
+// The interior keeps the address of the leg's model.
+static void open_leg(leg *l) {
+  *l = (leg){.t = tube_create(radius, 0.014, length, 0.012, 96, 60)};
+  assert_int_equal(sonde_interior_create(&l->t.model, &l->in, NULL), SONDE_OK);
+  sonde_interior_set_method(l->in, SONDE_INTERIOR_COLUMNS);
+  l->still = SONDE_NEW(sonde_vec3, l->t.model.surface.vertex_count);
+  l->pose = tube_pose(radius, length / 2);
+  assert_int_equal(sonde_echo_create(l->in, NULL, &l->echo, NULL), SONDE_OK);
 }
 
 static void close_leg(leg *l) {
@@ -40,8 +40,8 @@ typedef struct found {
   uint32_t count[2];
 } found;
 
-// The leg in a cuff, its flow after a beat, and what the cells of a box across it hold.
-static found look(leg *l, const char *state, double cuff_pa) {
+// The leg in a cuff, and its picture.
+static void press(leg *l, const char *state, double cuff_pa) {
   sonde_pathology pathology;
   assert_int_equal(sonde_pathology_preset(state, &pathology, NULL), SONDE_OK);
   sonde_interior_update(l->in, &(sonde_interior_input){.positions_m = l->t.model.surface.vertices,
@@ -58,6 +58,11 @@ static found look(leg *l, const char *state, double cuff_pa) {
   assert_int_equal(sonde_image_create(64, 64, &image, NULL), SONDE_OK);
   sonde_echo_render(l->echo, l->pose, 0.04, &pathology, &settings, &image);
   sonde_image_clear(&image);
+}
+
+// Its flow after a beat, and what the cells of a box across it hold.
+static found look(leg *l, const char *state, double cuff_pa) {
+  press(l, state, cuff_pa);
   sonde_flow_scene *scene = NULL;
   assert_int_equal(sonde_flow_scene_create(NULL, l->in, &scene, NULL), SONDE_OK);
   sonde_flow_def def = sonde_flow_def_default(NULL);
@@ -86,7 +91,8 @@ static found look(leg *l, const char *state, double cuff_pa) {
 
 static void test_conserves(void **unused) {
   (void)unused;
-  leg l = open_leg();
+  leg l;
+  open_leg(&l);
   const found rest = look(&l, "healthy", 0);
   print_message("at rest: %.3f ml/s in %u cells of %.3f; artery %.3f of %.3f\n",
                 1e6 * rest.cells_m3_s[0], rest.count[0], 1e6 * rest.through,
@@ -114,8 +120,115 @@ static void test_conserves(void **unused) {
   close_leg(&l);
 }
 
+// The spectrum of a gate over some seconds of steady flow along the vein: the mean of its columns,
+// of its edges, how many columns have any flow, their brightness.
+typedef struct heard {
+  double mean, peak, truth, flows, grey;
+  uint32_t columns;
+  sonde_gate_spectrum axes;
+} heard;
+
+static heard listen(leg *l, sonde_flow_scene *scene, sonde_flow *flow,
+                    const sonde_gate_settings *settings, double loss_db) {
+  sonde_gate *gate = NULL;
+  assert_int_equal(sonde_gate_create(&gate, NULL), SONDE_OK);
+  const sonde_gate_place place = {l->echo, 5e6, 0, loss_db};
+  heard h = {0};
+  uint64_t seen = 0;
+  double truths = 0;
+  sonde_flow_scene_listen(scene, gate);
+  for (int image = 0; image < 150; ++image) {
+    sonde_gate_put(gate, scene, settings, &place);
+    h.truth += sonde_gate_truth(gate, scene, l->echo), ++truths;
+    sonde_flow_scene_run(scene, flow, flow->time_s + 0.02);
+    sonde_gate_column column[SONDE_GATE_COLUMNS];
+    const uint32_t count = sonde_gate_columns(gate, column);
+    for (uint32_t n = 0; n < count; ++n) {
+      if (column[n].number <= seen) continue;
+      if (seen > 0) assert_int_equal(column[n].number, seen + 1);
+      seen = column[n].number, ++h.columns;
+      h.mean += (double)column[n].mean_m_s, h.peak += (double)column[n].peak_m_s;
+      h.flows += column[n].mean_m_s != 0;
+      for (int b = 0; b < SONDE_DOPPLER_BINS; ++b) h.grey += column[n].power[b];
+    }
+  }
+  h.mean /= h.columns, h.peak /= h.columns, h.flows /= h.columns, h.truth /= truths;
+  h.grey /= h.columns * SONDE_DOPPLER_BINS;
+  h.axes = sonde_gate_axes(gate);
+  sonde_flow_scene_listen(scene, NULL);
+  sonde_gate_destroy(gate);
+  return h;
+}
+
+// A gate in the vein has the blood's velocity along the beam at every lean of it, and folds where
+// its axis ends; beside the vessel, in a clot and in a shadow it has noise and no flow.
+static void test_gate(void **unused) {
+  (void)unused;
+  leg l;
+  open_leg(&l);
+  l.pose.rotation = q_mul(l.pose.rotation, (sonde_quat){sqrt(0.5), 0, 0, sqrt(0.5)});
+  press(&l, "healthy", 0);
+  sonde_flow_scene *scene = NULL;
+  sonde_flow flow;
+  sonde_flow_def def = sonde_flow_def_default(NULL);
+  def.breath_pa = 0, def.heart_rate_hz = 5; // as good as steady
+  assert_int_equal(sonde_flow_scene_create(NULL, l.in, &scene, NULL), SONDE_OK);
+  assert_int_equal(sonde_flow_start(&def, &flow, NULL), SONDE_OK);
+  sonde_flow_scene_run(scene, &flow, 0.5);
+  sonde_vessel_state vein;
+  assert_true(sonde_interior_vessel_at_plane(l.in, 0, tube_pose(radius, length / 2), &vein));
+  const sonde_vec3 at = pose_apply_inverse(l.pose, vein.centre_m);
+  sonde_gate_settings s = sonde_gate_settings_default();
+  s.x_m = at.x, s.z_m = at.z;
+  for (int k = 0; k < 3; ++k) {
+    s.steer_rad = (k - 1) * 0.35, s.scale_m_s = 0.15;
+    const heard h = listen(&l, scene, &flow, &s, 0);
+    print_message("lean %3.0f: mean %.2f of %.2f cm/s, edge %.2f, %u columns, %.0f %% with flow\n",
+                  s.steer_rad * 180 / SONDE_PI, 100 * h.mean, 100 * h.truth, 100 * h.peak,
+                  h.columns, 100 * h.flows);
+    assert_true(h.columns > 290);
+    // Across the flow the spectrum is as wide on either side.
+    if (k == 1) assert_true(fabs(h.mean) < 2e-3 && fabs(h.truth) < 1e-3);
+    if (k != 1) assert_near(h.mean / h.truth, 1, 0.05);
+    if (k != 1) assert_true(h.peak / h.truth > 1.1 && h.flows > 0.95);
+  }
+  // Base line at three quarters, range too small for the blood without it.
+  heard h = listen(&l, scene, &flow, &s, 0);
+  const double mean = h.mean, grey = h.grey;
+  s.scale_m_s = 1.1 * fabs(mean), s.baseline = mean > 0 ? 0.6 : -0.6;
+  h = listen(&l, scene, &flow, &s, 0);
+  print_message("base line moved: %.2f of %.2f cm/s in %.1f to %.1f\n", 100 * h.mean, 100 * mean,
+                100 * h.axes.low_m_s, 100 * (h.axes.low_m_s + 2 * h.axes.limit_m_s));
+  assert_near(h.mean / mean, 1, 0.05);
+  s.scale_m_s = 0.8 * fabs(mean), s.baseline = 0;
+  h = listen(&l, scene, &flow, &s, 0);
+  print_message("folded: %.2f of %.2f cm/s\n", 100 * h.mean, 100 * mean);
+  assert_true(h.mean * mean < 0);
+  s.scale_m_s = 0.15;
+  h = listen(&l, scene, &flow, &s, 60);
+  print_message("in a shadow: %.2f cm/s, grey %.1f instead of %.1f\n", 100 * h.mean, h.grey, grey);
+  assert_true(h.flows < 0.02 && h.grey > 2 && h.grey < 0.8 * grey);
+  s.z_m += 0.012;
+  h = listen(&l, scene, &flow, &s, 0);
+  assert_true(h.flows < 0.02 && h.truth == 0);
+  sonde_flow_scene_destroy(scene);
+  close_leg(&l);
+}
+
+static void test_cleans(void **unused) {
+  (void)unused;
+  const sonde_gate_settings usual = sonde_gate_settings_default();
+  sonde_gate_settings wild = {NAN, INFINITY, 1, -9, 9, 0, 5, -1, 99};
+  const sonde_gate_settings s = sonde_gate_clean(&wild, &usual), again = sonde_gate_clean(&s, &s);
+  assert_true(s.x_m == usual.x_m && s.z_m == usual.z_m && s.length_m == 15e-3);
+  assert_true(s.scale_m_s == 0.02 && s.baseline == 0.9 && s.filter_hz == 10 && s.gain_db == 30);
+  assert_memory_equal(&s, &again, sizeof s);
+  sonde_gate_destroy(NULL);
+}
+
 int main(int argc, char **argv) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_conserves)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_conserves), cmocka_unit_test(test_gate),
+                                     cmocka_unit_test(test_cleans)};
   if (argc > 1) cmocka_set_test_filter(argv[1]);
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -65,7 +65,7 @@ typedef struct fixture {
 } fixture;
 
 static inline page_source source_of(synthetic *s) {
-  return (page_source){s,         &s->model,     s->probes,      2,   40, next_frame,
+  return (page_source){s,         &s->model,     s->probes,      2,   40, false, next_frame,
                        note_goal, note_controls, first_controls, NULL};
 }
 

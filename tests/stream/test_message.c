@@ -65,6 +65,8 @@ static float f32_at(const unsigned char *b) {
   return value;
 }
 
+static sonde_gate_spectrum heard; // of the next frame
+
 // A frame of two nodes and 2 x 1 pixels, of which colour covers the right one; the first node moved
 // by far too much.
 static size_t make_frame(unsigned char *bytes, size_t capacity, bool colour) {
@@ -78,6 +80,7 @@ static size_t make_frame(unsigned char *bytes, size_t capacity, bool colour) {
   if (colour)
     frame.colour = (sonde_frame_colour){
         SONDE_DUPLEX_VELOCITY, {-0.01, 0.012, 0.004, 0.03, 0.25}, 0.0625, {1, 0, 1, 1, over}};
+  frame.spectrum = heard;
   sonde_snapshot *s = &frame.snapshot;
   s->tick = 0x0102030405060708u;
   s->time_s = 1.5;
@@ -107,6 +110,40 @@ static void colour_stands_behind_the_image(void **state) {
   assert_float_equal(f32_at(b + 182), 30, 0);         //
   assert_float_equal(f32_at(b + 186), 14.3239, 1e-4); // degrees
   assert_int_equal(b[190], 201);
+}
+
+// Behind the image, or the colours, with columns whose numbers go on from the first one's.
+static void a_spectrum_stands_behind_all(void **state) {
+  (void)state;
+  static sonde_gate_column column[2];
+  column[0].number = 0x0a0b0c, column[0].mean_m_s = 0.125f, column[0].peak_m_s = -0.25f;
+  column[0].power[127] = 9, column[1].power[0] = 17;
+  heard = (sonde_gate_spectrum){.on = true,
+                                .settings = {.x_m = -4e-3, .z_m = 0.02, .steer_rad = 0.25},
+                                .pulse_hz = 2500,
+                                .limit_m_s = 0.5,
+                                .low_m_s = -0.25,
+                                .count = 2,
+                                .column = column};
+  for (int colour = 0; colour < 2; ++colour) {
+    unsigned char b[600] = {0};
+    const size_t at = 154 + (colour ? 37 : 0);
+    assert_int_equal(make_frame(b, sizeof b, colour), at + 56 + 2 * 136);
+    static const unsigned char HEAD[8] = {3, 0, 2, 0, 128, 0, 0, 0};
+    assert_memory_equal(b + at, HEAD, sizeof HEAD);
+    assert_float_equal(f32_at(b + at + 8), -4, 0);          // x, depth, mm
+    assert_float_equal(f32_at(b + at + 12), 20, 0);         //
+    assert_float_equal(f32_at(b + at + 20), 14.3239, 1e-4); // lean, degrees
+    assert_float_equal(f32_at(b + at + 28), 50, 0);         // limit, lowest, cm/s
+    assert_float_equal(f32_at(b + at + 32), -25, 0);        //
+    assert_float_equal(f32_at(b + at + 36), 2500, 0);       // pulses, Hz
+    assert_int_equal(u32_at(b + at + 48), 0x0a0b0c);
+    assert_float_equal(f32_at(b + at + 56), 12.5, 0);
+    assert_float_equal(f32_at(b + at + 60), -25, 0);
+    assert_int_equal(b[at + 56 + 135], 9);
+    assert_int_equal(b[at + 56 + 136 + 8], 17);
+  }
+  heard.on = false;
 }
 
 static void frame_fields_stand_where_the_protocol_says(void **state) {
@@ -200,7 +237,7 @@ static void the_hello_can_be_read_by_a_json_parser(void **state) {
 }
 
 static cJSON *written_controls(double gain_db, page_hidden hidden) {
-  sonde_session_controls controls = {.echo = {.gain_db = gain_db}};
+  sonde_session_controls controls = {.echo = {.gain_db = gain_db}, .duplex.gate.scale_m_s = 0.25};
   sonde_json_out out = begin_text();
   snprintf(controls.pathology.name, sizeof controls.pathology.name, "healthy");
   page_write_controls(&out, &controls, "point", hidden, 0,
@@ -211,18 +248,23 @@ static cJSON *written_controls(double gain_db, page_hidden hidden) {
 // A learner is not told the case; the posture of a model that has its own is no control.
 static void controls_are_hidden(void **state) {
   (void)state;
-  cJSON *all = written_controls(0, (page_hidden){false, false}),
-        *none = written_controls(0, (page_hidden){true, true});
+  cJSON *all = written_controls(0, (page_hidden){false, false, false}),
+        *none = written_controls(0, (page_hidden){true, true, true});
   assert_string_equal(cJSON_GetObjectItem(all, "case")->valuestring, "healthy");
   assert_string_equal(cJSON_GetObjectItem(all, "posture")->valuestring, "supine");
   assert_string_equal(cJSON_GetObjectItem(none, "case")->valuestring, "");
   assert_null(cJSON_GetObjectItem(none, "posture"));
+  assert_true(cJSON_IsTrue(cJSON_GetObjectItem(all, "doppler")));
+  assert_float_equal(cJSON_GetObjectItem(all, "gate_scale_cm_s")->valuedouble, 25, 1e-9);
+  assert_true(cJSON_IsFalse(cJSON_GetObjectItem(none, "doppler")));
+  assert_null(cJSON_GetObjectItem(none, "colour"));
+  assert_null(cJSON_GetObjectItem(none, "gate"));
   cJSON_Delete(all);
   cJSON_Delete(none);
 }
 
 static double written(double gain_db) {
-  cJSON *root = written_controls(gain_db, (page_hidden){false, false});
+  cJSON *root = written_controls(gain_db, (page_hidden){false, false, false});
   assert_non_null(root);
   const cJSON *gain = cJSON_GetObjectItem(root, "gain_db");
   double value = cJSON_IsNull(gain) ? (double)NAN : gain->valuedouble;
@@ -272,6 +314,22 @@ static void controls_leave_out_what_is_absent(void **state) {
   assert_true(isnan(c.echo.gain_db) && isnan(c.echo.dynamic_range_db) && isnan(c.echo.focus_m));
   assert_string_equal(c.pathology, "healthy");
   assert_string_equal(c.probe, "");
+  // A gate's numbers change alone.
+  sonde_session_controls controls = {.duplex = sonde_duplex_controls_default()};
+  const sonde_gate_settings usual = controls.duplex.gate;
+  page_command_take(&c, &controls);
+  assert_memory_equal(&controls.duplex.gate, &usual, sizeof usual);
+  assert_int_equal(parse("{\"type\":\"controls\",\"gate\":true,\"gate_mm\":[-4,25],"
+                         "\"gate_steer_deg\":-20,\"gate_filter_hz\":100}",
+                         &c),
+                   SONDE_OK);
+  page_command_take(&c, &controls);
+  const sonde_gate_settings *gate = &controls.duplex.gate;
+  assert_true(controls.duplex.gated && gate->scale_m_s == usual.scale_m_s);
+  assert_float_equal(gate->x_m, -0.004, 1e-12);
+  assert_float_equal(gate->z_m, 0.025, 1e-12);
+  assert_float_equal(gate->steer_rad, -0.34907, 1e-5);
+  assert_float_equal(gate->filter_hz, 100, 0);
 }
 
 static void bad_commands_are_refused(void **state) {
@@ -303,6 +361,12 @@ static void bad_commands_are_refused(void **state) {
       "{\"type\":\"controls\",\"probe\":\"\"}",
       "{\"type\":\"controls\",\"probe\":5}",
       "{\"type\":\"controls\",\"case\":\"a name that is longer than any case may be\"}",
+      "{\"type\":\"controls\",\"gate\":1}",
+      "{\"type\":\"controls\",\"gate_mm\":[1]}",
+      "{\"type\":\"controls\",\"gate_mm\":[1,1e9]}",
+      "{\"type\":\"controls\",\"gate_scale_cm_s\":0}",
+      "{\"type\":\"controls\",\"gate_baseline\":1}",
+      "{\"type\":\"controls\",\"gate_angle_deg\":90}",
       "{\"type\":\"ack\"}",
       "{\"type\":\"ack\",\"frame\":-1}",
       "{\"type\":\"ack\",\"frame\":1.5}",
@@ -414,6 +478,7 @@ int main(void) {
       cmocka_unit_test(an_encoder_never_writes_beyond_its_buffer),
       cmocka_unit_test(line_has_golden_bytes),
       cmocka_unit_test(colour_stands_behind_the_image),
+      cmocka_unit_test(a_spectrum_stands_behind_all),
       cmocka_unit_test(frame_fields_stand_where_the_protocol_says),
       cmocka_unit_test(displacements_are_rounded_and_saturate),
       cmocka_unit_test(the_hello_can_be_read_by_a_json_parser),

@@ -9,7 +9,7 @@
 #include <string.h>
 
 // Members that follow each other in memory as in the file.
-enum { ECHO = 6, PATHOLOGY = 8, BOX = 5 };
+enum { ECHO = 6, PATHOLOGY = 8, BOX = 5, GATE = 9 };
 _Static_assert(offsetof(sonde_echo_settings, tgc_db_per_m) == (ECHO - 1) * sizeof(double),
                "the settings' numbers from frequency_hz on");
 _Static_assert(offsetof(sonde_pathology, echogenicity) ==
@@ -18,10 +18,11 @@ _Static_assert(offsetof(sonde_pathology, echogenicity) ==
 
 _Static_assert(offsetof(sonde_colour_box, steer_rad) == (BOX - 1) * sizeof(double),
                "the box's numbers from left_m on");
+_Static_assert(sizeof(sonde_gate_settings) == GATE * sizeof(double), "the gate's, from x_m on");
 
 size_t sonde_controls_bytes(int version) {
   SONDE_ASSERT(version >= SONDE_RECORD_OLDEST && version <= SONDE_RECORD_VERSION);
-  return version < 4 ? 152 : version < 9 ? 208 : 280;
+  return version < 4 ? 152 : version < 9 ? 208 : version < 10 ? 280 : 360;
 }
 
 void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
@@ -49,6 +50,9 @@ void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
   for (int i = 0; i < BOX; ++i) bytes_f64(w, (&c->duplex.box.left_m)[i]);
   bytes_f64(w, c->duplex.scale_m_s);
   bytes_f64(w, c->duplex.gain_db);
+  bytes_u32(w, c->duplex.gated ? 1 : 0);
+  bytes_u32(w, 0);
+  for (int i = 0; i < GATE; ++i) bytes_f64(w, (&c->duplex.gate.x_m)[i]);
   SONDE_ASSERT(w->count == start + sonde_controls_bytes(SONDE_RECORD_VERSION));
 }
 
@@ -96,6 +100,12 @@ void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c)
     for (int i = 0; i < BOX; ++i) (&duplex.box.left_m)[i] = bytes_take_f64(r);
     duplex.scale_m_s = bytes_take_f64(r);
     duplex.gain_db = bytes_take_f64(r);
+    duplex.gate = usual.gate;
+    if (version >= 10) {
+      duplex.gated = bytes_take_u32(r) & 1;
+      (void)bytes_take_u32(r);
+      for (int i = 0; i < GATE; ++i) (&duplex.gate.x_m)[i] = bytes_take_f64(r);
+    }
     c->duplex = sonde_duplex_clean(&duplex, &usual);
   }
   SONDE_ASSERT(r->at == start + sonde_controls_bytes(version));

@@ -6,8 +6,9 @@
 #include "sonde/limb_model.h"
 
 sonde_duplex_controls sonde_duplex_controls_default(void) {
-  return (sonde_duplex_controls){
-      .box = {-0.014, 0.014, 0.006, 0.036, 0}, .scale_m_s = 0.06, .gain_db = 0};
+  return (sonde_duplex_controls){.box = {-0.014, 0.014, 0.006, 0.036, 0},
+                                 .scale_m_s = 0.06,
+                                 .gate = sonde_gate_settings_default()};
 }
 
 sonde_status sonde_duplex_create(const sonde_model *model, const sonde_interior *interior,
@@ -25,6 +26,7 @@ sonde_status sonde_duplex_create(const sonde_model *model, const sonde_interior 
   const sonde_colour_def colour = sonde_colour_def_default(); // drawing tunes it
   if (!status) status = sonde_colour_create(&colour, &d->colour, error);
   if (!status) status = sonde_flow_scene_create(limb, interior, &d->scene, error);
+  if (!status) status = sonde_gate_create(&d->gate, error);
   if (!status) status = sonde_flow_start(&body, &d->body, error);
   if (status)
     sonde_duplex_destroy(d);
@@ -37,6 +39,7 @@ void sonde_duplex_destroy(sonde_duplex *d) {
   if (!d) return;
   sonde_flow_scene_destroy(d->scene);
   sonde_colour_destroy(d->colour);
+  sonde_gate_destroy(d->gate);
   sonde_free(d->cells);
   sonde_free(d);
 }
@@ -62,6 +65,7 @@ sonde_duplex_controls sonde_duplex_clean(const sonde_duplex_controls *wanted,
   }
   c.box.right_m = fmax(c.box.right_m, c.box.left_m + least_m);
   c.box.bottom_m = fmax(c.box.bottom_m, c.box.top_m + least_m);
+  c.gate = sonde_gate_clean(&wanted->gate, &before->gate);
   return c;
 }
 

@@ -1,5 +1,5 @@
-// Doppler over a session's images: the patient's blood flow, run from image to image, and the
-// colour that a scanner makes of it. Belongs to the image thread.
+// Doppler over a session's images: the patient's blood flow, run from image to image, the colour
+// and the spectrum that a scanner makes of it. Belongs to the image thread.
 #ifndef SONDE_SRC_DUPLEX_H
 #define SONDE_SRC_DUPLEX_H
 
@@ -40,6 +40,10 @@ typedef struct sonde_duplex {
   bool seen;
   double seen_s, seen_width_m, seen_height_m;
   sonde_vec3 rest_m[SONDE_DUPLEX_GRID * SONDE_DUPLEX_GRID];
+  sonde_gate *gate;
+  // tissue in the gate when it was put last: at rest, when, and where the gate was
+  sonde_vec3 gate_rest_m;
+  double gated_s, gated_xz_m[2]; // NaN: never
 } sonde_duplex;
 
 // The duplex of a session's interior and echo, both borrowed. @thread owner
@@ -62,6 +66,11 @@ void sonde_duplex_move(sonde_duplex *duplex, const sonde_duplex_moment *moment,
 void sonde_duplex_draw(sonde_duplex *duplex, const sonde_duplex_moment *moment,
                        const sonde_image *image, double frequency_hz, const float *coupling,
                        uint32_t lines, sonde_frame_colour *colour);
+// Puts the gate into that picture and hands over the columns that came since it was put first, in
+// column[SONDE_GATE_COLUMNS] (hot).
+void sonde_duplex_hear(sonde_duplex *duplex, const sonde_duplex_moment *moment,
+                       const sonde_image *image, double frequency_hz, const float *coupling,
+                       uint32_t lines, sonde_gate_column *column, sonde_gate_spectrum *spectrum);
 // The next picture holds nothing of those before (hot).
 void sonde_duplex_forget(sonde_duplex *duplex);
 sonde_duplex_memory sonde_duplex_remember(const sonde_duplex *duplex);

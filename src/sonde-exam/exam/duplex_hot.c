@@ -1,4 +1,4 @@
-// Blood and colour of one image.
+// Blood, colour and spectrum of one image.
 #include "exam/duplex.h"
 
 #include "base/base.h"
@@ -6,16 +6,22 @@
 #include "echo/truth.h"
 
 enum { GRID = SONDE_DUPLEX_GRID, PLACES = GRID * GRID };
+static const double highest_hz = 5e6; // of Doppler pulses, whatever the image's
+static const double dark_db = 60;     // lost behind bone and where no body is
 
 void sonde_duplex_forget(sonde_duplex *d) {
   SONDE_ASSERT(d != NULL);
-  d->seen = false;
+  d->seen = false, d->gated_s = (double)NAN;
+  sonde_gate_forget(d->gate);
 }
 
 void sonde_duplex_follow(sonde_duplex *d, const sonde_duplex_moment *now) {
   SONDE_ASSERT(d && now && isfinite(now->time_s));
-  if (now->controls->shown == SONDE_DUPLEX_OFF) {
-    d->flows = d->seen = false;
+  const bool gated = now->controls->gated;
+  if (now->controls->shown == SONDE_DUPLEX_OFF) d->seen = false;
+  if (!gated) sonde_gate_forget(d->gate);
+  if (now->controls->shown == SONDE_DUPLEX_OFF && !gated) {
+    d->flows = false;
     return;
   }
   // Patient and hand now; veins as probe and clots leave them.
@@ -23,6 +29,7 @@ void sonde_duplex_follow(sonde_duplex *d, const sonde_duplex_moment *now) {
   const sonde_circulation *c = now->circulation;
   if (c) {
     def.heart_rate_hz = c->heart_rate_hz, def.breath_rate_hz = c->breath_rate_hz;
+    def.leak = c->valve_leak;
     if (c->valsalva_to_s > c->valsalva_from_s)
       def.valsalva_from_s = c->valsalva_from_s, def.valsalva_to_s = c->valsalva_to_s;
   }
@@ -34,8 +41,10 @@ void sonde_duplex_follow(sonde_duplex *d, const sonde_duplex_moment *now) {
   if (!(d->flows && now->time_s >= flow.time_s && now->time_s - flow.time_s <= most_s)) {
     flow = d->body, flow.def = def, flow.time_s = now->time_s;
     sonde_flow_settle(&flow);
+    sonde_gate_forget(d->gate);
   }
   d->flows = true, flow.def = def;
+  sonde_flow_scene_listen(d->scene, gated ? d->gate : NULL);
   sonde_flow_scene_run(d->scene, &flow, now->time_s);
 }
 
@@ -73,7 +82,7 @@ void sonde_duplex_move(sonde_duplex *d, const sonde_duplex_moment *now, const so
     const float a = (float)(across - x), b = (float)(down - y), *at = towards + y * GRID + x;
     d->cells[i].towards_m_s +=
         (1 - b) * ((1 - a) * at[0] + a * at[1]) + b * ((1 - a) * at[GRID] + a * at[GRID + 1]);
-    const double dark_db = 60, line = (xz[0] / image->width_m + 0.5) * (lines - 1);
+    const double line = (xz[0] / image->width_m + 0.5) * (lines - 1);
     if (!(line >= 0 && line <= lines - 1) || xz[1] > dark_from_m[lround(across)])
       d->cells[i].loss_db = (float)dark_db;
     else if (coupling)
@@ -87,7 +96,7 @@ void sonde_duplex_draw(sonde_duplex *d, const sonde_duplex_moment *now, const so
   SONDE_ASSERT(d && now && image && out && out->over.pixels && lines > 1);
   const sonde_duplex_controls *c = now->controls;
   out->shown = SONDE_DUPLEX_OFF;
-  if (!d->flows) return;
+  if (!d->flows || c->shown == SONDE_DUPLEX_OFF) return;
   // The box within the picture, and pulses as far apart as the scale wants and the depth allows.
   sonde_colour_box box = c->box;
   const double least_m = sonde_duplex_least_m, half_m = 0.5 * image->width_m;
@@ -96,7 +105,7 @@ void sonde_duplex_draw(sonde_duplex *d, const sonde_duplex_moment *now, const so
   box.top_m = clamp(box.top_m, 0, image->height_m - least_m);
   box.bottom_m = clamp(box.bottom_m, box.top_m + least_m, image->height_m);
   sonde_colour_def def = sonde_colour_def_default();
-  const double highest_hz = 5e6, sound_m_s = 1540, most_hz = sound_m_s / (2 * box.bottom_m);
+  const double sound_m_s = 1540, most_hz = sound_m_s / (2 * box.bottom_m);
   def.frequency_hz = fmin(frequency_hz, highest_hz), def.persistence = sonde_duplex_persistence;
   def.pulse_hz =
       clamp(def.pulse_hz * c->scale_m_s / sonde_colour_limit(&def), 100, fmin(most_hz, 2e4));
@@ -109,4 +118,45 @@ void sonde_duplex_draw(sonde_duplex *d, const sonde_duplex_moment *now, const so
   sonde_colour_paint(d->colour, &box, c->gain_db, c->shown == SONDE_DUPLEX_POWER, image,
                      &out->over);
   out->shown = c->shown, out->box = box, out->limit_m_s = sonde_colour_limit(&def);
+}
+
+void sonde_duplex_hear(sonde_duplex *d, const sonde_duplex_moment *now, const sonde_image *image,
+                       double frequency_hz, const float *coupling, uint32_t lines,
+                       sonde_gate_column *column, sonde_gate_spectrum *out) {
+  SONDE_ASSERT(d && now && image && column && out && lines > 1);
+  *out = (sonde_gate_spectrum){.on = false};
+  if (!d->flows || !now->controls->gated) return;
+  sonde_gate_settings gate = now->controls->gate;
+  const double half_m = 0.5 * image->width_m, lean = tan(gate.steer_rad);
+  gate.x_m = clamp(gate.x_m, -half_m, half_m), gate.z_m = fmin(gate.z_m, image->height_m);
+  sonde_gate_place place = {d->echo, fmin(frequency_hz, highest_hz), 0, 0};
+  // Down the beam to the gate: bone, or no body, or a face without gel.
+  enum { STEPS = 12 };
+  sonde_truth_pixel pixel = {.rest_m = {(double)NAN, (double)NAN, (double)NAN}};
+  for (int k = 1; k <= STEPS; ++k) {
+    const double z = gate.z_m * k / STEPS, x = gate.x_m - (gate.z_m - z) * lean;
+    const double across = (x / image->width_m + 0.5) * image->width,
+                 down = z / image->height_m * image->height;
+    const bool beside = !(across >= 0 && across < image->width);
+    if (!beside)
+      (void)sonde_truth_at(d->echo, image, (uint32_t)across,
+                           (uint32_t)fmin(down, image->height - 1.0), &pixel);
+    if (beside || pixel.label == SONDE_LABEL_OUTSIDE || pixel.label == SONDE_LABEL_BONE)
+      place.loss_db = dark_db;
+  }
+  const double start = ((gate.x_m - gate.z_m * lean) / image->width_m + 0.5) * (lines - 1);
+  if (coupling && start >= 0 && start <= lines - 1)
+    place.loss_db -= 20 * log10(fmax((double)coupling[lround(start)], 1e-3));
+  // The tissue's way along the beam since the last picture, when the gate stayed where it was.
+  const sonde_vec3 beam = q_rotate(sonde_truth_pose(d->echo).rotation,
+                                   vec3(sin(gate.steer_rad), 0, cos(gate.steer_rad)));
+  const sonde_vec3 way = v_sub(pixel.rest_m, d->gate_rest_m);
+  if (now->time_s > d->gated_s && d->gated_xz_m[0] == gate.x_m && d->gated_xz_m[1] == gate.z_m &&
+      v_finite(way))
+    place.tissue_m_s = v_dot(way, beam) / (now->time_s - d->gated_s);
+  d->gate_rest_m = pixel.rest_m, d->gated_s = now->time_s;
+  d->gated_xz_m[0] = gate.x_m, d->gated_xz_m[1] = gate.z_m;
+  sonde_gate_put(d->gate, d->scene, &gate, &place);
+  *out = sonde_gate_axes(d->gate);
+  out->count = sonde_gate_columns(d->gate, column), out->column = column;
 }

@@ -10,7 +10,7 @@
 #include "exam/setup.h"
 
 enum {
-  SONDE_RECORD_VERSION = 9,
+  SONDE_RECORD_VERSION = 10,
   SONDE_RECORD_JOURNAL = 8, // from this version on a recording is a journal
   SONDE_RECORD_OLDEST = 3,  // that can be read
   SONDE_RECORD_TICK = 1,

@@ -66,6 +66,7 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
     session->skin_at = place(&frame_end, 3 * session->nodes * sizeof(float));
     session->pixels_at = place(&frame_end, (size_t)session->image_width * session->image_height);
     session->colour_at = place(&frame_end, (size_t)session->image_width * session->image_height);
+    session->spectrum_at = place(&frame_end, SONDE_GATE_COLUMNS * sizeof(sonde_gate_column));
     status = sonde_mailbox_create(sizeof(sonde_session_controls), &session->control_box, error);
     if (!status) status = sonde_mailbox_create(surface_end, &session->surface_box, error);
     if (!status) status = sonde_mailbox_create(frame_end, &session->frame_box, error);
@@ -135,6 +136,9 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   for (size_t i = 0; i < SONDE_COUNT_OF(numbers); ++i)
     if (!isfinite(numbers[i]))
       return sonde_fail(error, SONDE_ARGUMENT, "session: a circulation with a number that is none");
+  if (!(c->valve_leak >= 0 && c->valve_leak <= 1))
+    return sonde_fail(error, SONDE_ARGUMENT, "session: valves that leak %g, expected 0 to 1",
+                      c->valve_leak);
   if (!(def->gel_m3 >= 0 && def->gel_m3 <= 1e-3))
     return sonde_fail(error, SONDE_ARGUMENT, "session: %g m^3 of gel, expected 0 to 0.001",
                       def->gel_m3);

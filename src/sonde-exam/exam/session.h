@@ -99,8 +99,8 @@ struct sonde_session {
   uint32_t ticks_per_image;
   uint32_t image_width, image_height;
   size_t nodes;
-  size_t positions_at, forces_at, film_at, skin_at, pixels_at,
-      colour_at; // offsets inside mailbox slots
+  size_t positions_at, forces_at, film_at, skin_at, pixels_at, colour_at,
+      spectrum_at; // offsets inside mailbox slots
 
   // tick
   sonde_subject *subject;
@@ -197,7 +197,7 @@ sonde_status sonde_session_recall(sonde_session *session, const sonde_tick_memor
 bool sonde_session_show(sonde_session *session);
 bool sonde_session_follow(sonde_session *session);
 void sonde_session_draw(sonde_session *session);
-// Hash of a frame's pixels and colour behind those before it.
+// Hash of a frame's pixels, colour and spectrum behind those before it.
 uint64_t sonde_frame_hash(uint64_t before, const sonde_frame *frame);
 // The journal of the definition, if it asks for one, and what leads to it.
 sonde_status sonde_session_create_recording(sonde_session *session, const sonde_session_def *def,

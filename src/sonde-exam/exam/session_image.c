@@ -117,32 +117,31 @@ void sonde_session_draw(sonde_session *session) {
   sonde_frame *frame = (void *)sonde_mailbox_write_slot(session->frame_box);
   unsigned char *out = (unsigned char *)frame;
   const sonde_surface_slot *head = (const void *)session->surface;
-  // Depth of the face below the resting skin: along the axis from well outside, the first crossing
-  // is the skin above the face, whether the face is above or below it. Beside the thigh the signed
-  // closest distance takes over.
+  // Depth of the face below the resting skin: along the axis from well outside to the first
+  // crossing; beside the thigh the signed closest distance takes over.
   const sonde_surface_index *rest = session->subject->rest_skin;
   const double back_m = 0.15, reach_m = 0.3;
-  sonde_pose pose = head->snapshot.world_from_probe;
+  const sonde_pose pose = head->snapshot.world_from_probe;
   sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
   sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
   sonde_surface_point hit;
-  double depth_m = 0;
+  double depth_m, coupling = couple(session, session->surface);
   if (!sonde_surface_inside(rest, outside) &&
       sonde_surface_raycast(rest, outside, axis, reach_m, &hit)) {
     depth_m = back_m - v_dot(v_sub(hit.point_m, outside), axis);
   } else {
-    depth_m = sonde_surface_closest(rest, pose.position).distance_m;
-    if (!sonde_surface_inside(rest, pose.position)) depth_m = -depth_m;
+    depth_m = (sonde_surface_inside(rest, pose.position) ? 1 : -1) *
+              sonde_surface_closest(rest, pose.position).distance_m;
   }
   // The skin in single precision.
   const double *positions_m = (const void *)(session->surface + session->positions_at);
   float *skin_m = (float *)(void *)(out + session->skin_at);
   for (size_t i = 0; i < 3 * session->nodes; ++i) skin_m[i] = (float)positions_m[i];
-  sonde_image image = {.width = session->image_width,
-                       .height = session->image_height,
-                       .pixels = out + session->pixels_at};
+  sonde_image image = {session->image_width,    session->image_height, 0, 0, 0,
+                       out + session->pixels_at};
   sonde_frame_colour colour = {.over.pixels = out + session->colour_at};
-  double coupling = couple(session, session->surface);
+  const float *gel = head->controls.gel ? session->line_coupling : NULL;
+  frame->spectrum.on = false;
   bool off = head->snapshot.flags & SONDE_FLAG_INSIDE_OUT; // the probe sees no body
   if (session->echo && !off) {
     sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
@@ -154,10 +153,12 @@ void sonde_session_draw(sonde_session *session) {
                       &head->pathology, &settings, &image);
     SONDE_ASSERT(sonde_interior_tick(session->interior) == head->snapshot.tick);
     const sonde_duplex_moment moment = duplex_moment(session, head);
-    if (session->duplex)
-      sonde_duplex_draw(session->duplex, &moment, &image, settings.frequency_hz,
-                        head->controls.gel ? session->line_coupling : NULL, session->lines,
-                        &colour);
+    if (session->duplex) {
+      sonde_duplex_draw(session->duplex, &moment, &image, settings.frequency_hz, gel,
+                        session->lines, &colour);
+      sonde_duplex_hear(session->duplex, &moment, &image, settings.frequency_hz, gel,
+                        session->lines, (void *)(out + session->spectrum_at), &frame->spectrum);
+    }
   } else {
     memset(image.pixels, 0, (size_t)image.width * image.height);
     if (session->echo)
@@ -170,11 +171,12 @@ void sonde_session_draw(sonde_session *session) {
                          .height = image.height,
                          .width_m = image.width_m,
                          .height_m = image.height_m,
-                         .colour = colour};
+                         .colour = colour,
+                         .spectrum = frame->spectrum};
   frame->snapshot.gel_coupling = coupling;
   const double *film_m = (const void *)(session->surface + session->film_at);
-  double gel_m3 = head->controls.gel ? 0 : (double)NAN;
-  for (size_t i = 0; head->controls.gel && i < session->nodes; ++i)
+  double gel_m3 = gel ? 0 : (double)NAN;
+  for (size_t i = 0; gel && i < session->nodes; ++i)
     gel_m3 += film_m[i] * session->model->area_m2[i];
   frame->snapshot.gel_volume_m3 = gel_m3;
   frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
@@ -193,9 +195,11 @@ void sonde_session_draw(sonde_session *session) {
 
 uint64_t sonde_frame_hash(uint64_t before, const sonde_frame *frame) {
   const sonde_colour_overlay *over = &frame->colour.over;
-  const uint64_t hash = sonde_hash(before, frame->pixels, (size_t)frame->width * frame->height);
-  return frame->colour.shown ? sonde_hash(hash, over->pixels, (size_t)over->width * over->height)
-                             : hash;
+  const sonde_gate_spectrum *heard = &frame->spectrum;
+  uint64_t hash = sonde_hash(before, frame->pixels, (size_t)frame->width * frame->height);
+  if (frame->colour.shown)
+    hash = sonde_hash(hash, over->pixels, (size_t)over->width * over->height);
+  return heard->on ? sonde_hash(hash, heard->column, heard->count * sizeof *heard->column) : hash;
 }
 
 bool sonde_session_show(sonde_session *session) {

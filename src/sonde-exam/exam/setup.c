@@ -67,7 +67,8 @@ static uint32_t list_circulation(number *list, sonde_circulation *c) {
       {"heart_rate_hz", &c->heart_rate_hz}, {"systolic_pa", &c->systolic_pa},
       {"diastolic_pa", &c->diastolic_pa},   {"breath_rate_hz", &c->breath_rate_hz},
       {"breath_pa", &c->breath_pa},         {"valsalva_from_s", &c->valsalva_from_s},
-      {"valsalva_to_s", &c->valsalva_to_s}, {"valsalva_pa", &c->valsalva_pa}};
+      {"valsalva_to_s", &c->valsalva_to_s}, {"valsalva_pa", &c->valsalva_pa},
+      {"valve_leak", &c->valve_leak}};
   memcpy(list, own, sizeof own);
   return SONDE_COUNT_OF(own);
 }
@@ -173,7 +174,10 @@ bool sonde_setup_read(const sonde_json *header, sonde_setup *setup) {
   setup->circulation.posture = (sonde_posture)(int)posture;
   uint32_t count = list_circulation(list, &setup->circulation);
   read_list(circulation, list, count);
+  // Before version 10 all valves were sound.
+  double *leak = &setup->circulation.valve_leak;
+  if (!sonde_json_member(circulation, "valve_leak")) *leak = 0;
   for (uint32_t i = 0; i < count; ++i)
     if (!isfinite(*list[i].value)) return false;
-  return true;
+  return *leak >= 0 && *leak <= 1;
 }

@@ -68,6 +68,33 @@ static uint16_t quantise(double displacement_m) {
   return (uint16_t)(int16_t)lrint(clamp(steps, -32767, 32767));
 }
 
+// The spectrum behind a frame's image and colours.
+static void put_spectrum(bytes_cursor *out, const sonde_gate_spectrum *heard) {
+  const sonde_gate_settings *gate = &heard->settings;
+  const double cm_s = 100;
+  bytes_u16(out, PAGE_SPECTRUM);
+  bytes_u16(out, (uint16_t)heard->count);
+  bytes_u16(out, SONDE_DOPPLER_BINS);
+  bytes_u16(out, 0);
+  bytes_f32(out, gate->x_m * MM);
+  bytes_f32(out, gate->z_m * MM);
+  bytes_f32(out, gate->length_m * MM);
+  bytes_f32(out, gate->steer_rad * 180 / SONDE_PI);
+  bytes_f32(out, gate->angle_rad * 180 / SONDE_PI);
+  bytes_f32(out, heard->limit_m_s * cm_s);
+  bytes_f32(out, heard->low_m_s * cm_s);
+  bytes_f32(out, heard->pulse_hz);
+  bytes_f32(out, heard->window_s);
+  bytes_f32(out, SONDE_GATE_COLUMN_S);
+  bytes_u64(out, heard->count > 0 ? heard->column[0].number : 0);
+  for (uint32_t n = 0; n < heard->count; ++n) {
+    const sonde_gate_column *column = &heard->column[n];
+    bytes_f32(out, (double)column->mean_m_s * cm_s);
+    bytes_f32(out, (double)column->peak_m_s * cm_s);
+    bytes_put(out, column->power, sizeof column->power);
+  }
+}
+
 size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint32_t sequence,
                          unsigned char *bytes, size_t capacity) {
   SONDE_ASSERT(frame && rest && frame->skin_m && frame->pixels);
@@ -76,6 +103,9 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
   size_t size = PAGE_FRAME_FIXED_BYTES + 6 * (size_t)rest->vertex_count + pixels;
   const sonde_colour_overlay *over = &frame->colour.over;
   if (frame->colour.shown) size += PAGE_COLOUR_FIXED_BYTES + (size_t)over->width * over->height;
+  const sonde_gate_spectrum *heard = &frame->spectrum;
+  if (heard->on)
+    size += PAGE_SPECTRUM_FIXED_BYTES + (size_t)heard->count * (8 + SONDE_DOPPLER_BINS);
   if (size > capacity) return size;
   bytes_cursor out = {bytes, capacity, 0};
   put_header(&out, PAGE_FRAME, sequence, size);
@@ -131,6 +161,7 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
     bytes_f32(&out, box->steer_rad * 180 / SONDE_PI);
     bytes_put(&out, over->pixels, (size_t)over->width * over->height);
   }
+  if (heard->on) put_spectrum(&out, heard);
   SONDE_ASSERT(out.count == size);
   return size;
 }

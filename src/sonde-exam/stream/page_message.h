@@ -5,17 +5,20 @@
 #define SONDE_SRC_STREAM_PAGE_MESSAGE_H
 
 #include "base/base.h"
+#include "base/maths.h"
 #include "sonde/base_json.h"
 #include "sonde/stream.h"
 
 enum {
   PAGE_VERSION = 3,
   PAGE_HEADER_BYTES = 16,
-  PAGE_MESH_FIXED_BYTES = 24,   // header and counts, before the points
-  PAGE_FRAME_FIXED_BYTES = 140, // header and snapshot, before the displacements
-  PAGE_COLOUR_FIXED_BYTES = 36, // before the colours of a frame
-  PAGE_COMMAND_BYTES = 4096,    // longest message accepted from a browser
-  PAGE_COMMAND_DEPTH = 3,       // deepest nesting accepted
+  PAGE_MESH_FIXED_BYTES = 24,     // header and counts, before the points
+  PAGE_FRAME_FIXED_BYTES = 140,   // header and snapshot, before the displacements
+  PAGE_COLOUR_FIXED_BYTES = 36,   // before the colours of a frame
+  PAGE_SPECTRUM_FIXED_BYTES = 56, // before the columns of a frame's spectrum
+  PAGE_SPECTRUM = 3,              // what it begins with, where colours have a sonde_duplex_shown
+  PAGE_COMMAND_BYTES = 4096,      // longest message accepted from a browser
+  PAGE_COMMAND_DEPTH = 3,         // deepest nesting accepted
 };
 
 typedef enum page_type { PAGE_MESH = 1, PAGE_LINE = 2, PAGE_FRAME = 3 } page_type;
@@ -66,11 +69,27 @@ typedef struct page_role {
 typedef struct page_hidden {
   bool pathology; // a learner may not be told its name
   bool posture;   // the model says how it is held
+  bool doppler;   // a curved face has none
 } page_hidden;
 
 // A sonde_duplex_shown in messages.
 enum { PAGE_COLOURS = 3 };
 static const char *const page_colour_word[PAGE_COLOURS] = {"off", "velocity", "power"};
+
+// Numbers of a gate in messages: keys, units, ranges.
+enum { PAGE_GATE_NUMBERS = 7 };
+static const struct {
+  const char *key;
+  double si, low, high;
+  size_t offset;
+} page_gate_number[PAGE_GATE_NUMBERS] = {
+    {"gate_length_mm", 1e-3, 0.5, 15, offsetof(sonde_gate_settings, length_m)},
+    {"gate_steer_deg", SONDE_PI / 180, -20, 20, offsetof(sonde_gate_settings, steer_rad)},
+    {"gate_angle_deg", SONDE_PI / 180, -80, 80, offsetof(sonde_gate_settings, angle_rad)},
+    {"gate_scale_cm_s", 1e-2, 2, 200, offsetof(sonde_gate_settings, scale_m_s)},
+    {"gate_baseline", 1, -0.9, 0.9, offsetof(sonde_gate_settings, baseline)},
+    {"gate_filter_hz", 1, 10, 1000, offsetof(sonde_gate_settings, filter_hz)},
+    {"gate_gain_db", 1, -30, 30, offsetof(sonde_gate_settings, gain_db)}};
 
 // Each writer puts one message onto a text in memory.
 void page_write_hello(sonde_json_out *out, const page_hello *hello);
@@ -101,7 +120,9 @@ typedef struct page_command {
   double stiffness_scale, damping_scale, friction_scale;
   double colour_box_m[4]; // left, right, top, bottom
   double colour_steer_rad, colour_scale_m_s, colour_gain_db;
-  int colour; // a sonde_duplex_shown; -1: as it is
+  int colour;               // a sonde_duplex_shown; -1: as it is
+  int gated;                // 1, 0; -1: as it is
+  sonde_gate_settings gate; // NaN: as it is
   char posture[16];
   int strain; // 1, 0; -1: as it is
   bool gel_put, gel_wipe;

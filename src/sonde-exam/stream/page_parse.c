@@ -97,6 +97,10 @@ static double *setting_of(sonde_echo_settings *echo, const sonde_echo_range *ran
   return (double *)(void *)((char *)echo + range->offset);
 }
 
+static double *gate_number(sonde_gate_settings *gate, size_t k) {
+  return (double *)(void *)((char *)gate + page_gate_number[k].offset);
+}
+
 static void read_controls(reader *r, page_command *command) {
   static const char *const OTHERS[] = {"type",
                                        "probe",
@@ -110,7 +114,9 @@ static void read_controls(reader *r, page_command *command) {
                                        "colour_box_mm",
                                        "colour_steer_deg",
                                        "colour_gain_db",
-                                       "colour_scale_cm_s"};
+                                       "colour_scale_cm_s",
+                                       "gate",
+                                       "gate_mm"};
   const sonde_echo_range *range = sonde_echo_ranges();
   const double absent = (double)NAN;
   // An unknown key is a mistake of the page: what it asks for would not happen, unseen.
@@ -119,6 +125,8 @@ static void read_controls(reader *r, page_command *command) {
     bool known = false;
     for (size_t k = 0; k < SONDE_ECHO_SETTINGS; ++k) known |= strcmp(key, range[k].key) == 0;
     for (size_t k = 0; k < SONDE_COUNT_OF(OTHERS); ++k) known |= strcmp(key, OTHERS[k]) == 0;
+    for (size_t k = 0; k < PAGE_GATE_NUMBERS; ++k)
+      known |= strcmp(key, page_gate_number[k].key) == 0;
     if (!known) refuse(r, "there is no control \"%.40s\"", key);
   }
   // Settings come in the page's units; NaN leaves a control as it is.
@@ -142,6 +150,14 @@ static void read_controls(reader *r, page_command *command) {
   command->colour_steer_rad = SONDE_PI / 180 * read_real(r, "colour_steer_deg", -20, 20, absent);
   command->colour_scale_m_s = 1e-2 * read_real(r, "colour_scale_cm_s", 1, 100, absent);
   command->colour_gain_db = read_real(r, "colour_gain_db", -30, 20, absent);
+  command->gated = sonde_json_member(r->root, "gate") ? read_bool(r, "gate") : -1;
+  double place[2] = {absent, absent};
+  if (sonde_json_member(r->root, "gate_mm")) read_vector(r, "gate_mm", 2, reach_mm, place);
+  command->gate.x_m = 1e-3 * place[0], command->gate.z_m = 1e-3 * place[1];
+  for (size_t k = 0; k < PAGE_GATE_NUMBERS; ++k)
+    *gate_number(&command->gate, k) =
+        page_gate_number[k].si * read_real(r, page_gate_number[k].key, page_gate_number[k].low,
+                                           page_gate_number[k].high, absent);
   read_name(r, "probe", command->probe, sizeof command->probe);
   read_name(r, "case", command->pathology, sizeof command->pathology);
   read_name(r, "posture", command->posture, sizeof command->posture);
@@ -279,6 +295,11 @@ void page_command_take(const page_command *command, sonde_session_controls *cont
   take(command->colour_steer_rad, &duplex->box.steer_rad);
   take(command->colour_scale_m_s, &duplex->scale_m_s);
   take(command->colour_gain_db, &duplex->gain_db);
+  if (command->gated >= 0) duplex->gated = command->gated > 0;
+  take(command->gate.x_m, &duplex->gate.x_m), take(command->gate.z_m, &duplex->gate.z_m);
+  sonde_gate_settings asked_gate = command->gate;
+  for (size_t k = 0; k < PAGE_GATE_NUMBERS; ++k)
+    take(*gate_number(&asked_gate, k), gate_number(&duplex->gate, k));
   if (command->strain >= 0) controls->valsalva = command->strain > 0;
   controls->echo = sonde_echo_settings_clamp(controls->echo);
 }

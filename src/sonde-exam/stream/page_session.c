@@ -47,9 +47,17 @@ static sonde_status make_source(sonde_session *session, double force_limit_n, pa
   bool by_page = device && strcmp(device->name, "page") == 0;
   *self = (session_source){session, by_page ? device : NULL, probes};
   for (uint32_t i = 0; i < session->probe_count; ++i) probes[i] = sonde_session_probe(session, i);
-  *source =
-      (page_source){self,       session->model, probes,       session->probe_count, force_limit_n,
-                    take_frame, set_goal,       set_controls, get_controls,         release};
+  *source = (page_source){.self = self,
+                          .model = session->model,
+                          .probes = probes,
+                          .probe_count = session->probe_count,
+                          .force_limit_n = force_limit_n,
+                          .no_doppler = session->echo && !session->duplex,
+                          .frame = take_frame,
+                          .goal = set_goal,
+                          .control = set_controls,
+                          .controls_now = get_controls,
+                          .release = release};
   return SONDE_OK;
 }
 

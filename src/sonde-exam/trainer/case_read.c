@@ -334,8 +334,9 @@ sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
 sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *out,
                               sonde_error *error) {
   SONDE_ASSERT(text && name && out);
-  static const char *const CIRCULATION[] = {"posture",       "breath_mmhg",   "valsalva_from_s",
-                                            "valsalva_to_s", "valsalva_mmhg", NULL};
+  static const char *const CIRCULATION[] = {
+      "posture",    "breath_mmhg", "valsalva_from_s", "valsalva_to_s", "valsalva_mmhg",
+      "valve_leak", NULL};
   const char *keys[] = {"sonde_case", "id",    "title", "level",       "history",
                         "note",       "thigh", "leg",   "circulation", "vein",
                         "findings",   "truth", NULL,    NULL};
@@ -373,6 +374,7 @@ sonde_status sonde_case_parse(const char *text, const char *name, sonde_case *ou
         pa * sonde_read_real(reader, at, "valsalva_mmhg", 0, 60, flow->valsalva_pa / pa);
     flow->valsalva_from_s = sonde_read_real(reader, at, "valsalva_from_s", 0, 3600, 0);
     flow->valsalva_to_s = sonde_read_real(reader, at, "valsalva_to_s", 0, 3600, 0);
+    flow->valve_leak = sonde_read_real(reader, at, "valve_leak", 0, 1, 0);
     if (flow->valsalva_to_s < flow->valsalva_from_s)
       sonde_reader_fail(reader, at, SONDE_ARGUMENT,
                         "valsalva_to_s is %g, expected valsalva_from_s (%g) or more",

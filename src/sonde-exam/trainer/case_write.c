@@ -96,6 +96,7 @@ static void put_case(sonde_file *file, const sonde_case *c) {
   if (flow->valsalva_to_s > flow->valsalva_from_s)
     sonde_file_printf(file, ", valsalva_from_s: %.12g, valsalva_to_s: %.12g", flow->valsalva_from_s,
                       flow->valsalva_to_s);
+  if (flow->valve_leak > 0) sonde_file_printf(file, ", valve_leak: %.12g", flow->valve_leak);
   sonde_file_printf(file, ", valsalva_mmhg: %.12g}\n", flow->valsalva_pa / SONDE_PA_PER_MMHG);
 
   sonde_file_printf(file, "vein:");

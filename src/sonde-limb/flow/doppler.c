@@ -6,6 +6,7 @@
 #include "base/base.h"
 #include "base/maths.h"
 #include "base/random.h"
+#include "flow/spectrum.h"
 
 enum { SCATTERERS = 260, BINS = SONDE_DOPPLER_BINS };
 static const double sound_m_s = 1540, beyond_beam = 3, spare_m = 1.2e-3;
@@ -24,7 +25,6 @@ struct sonde_doppler {
   double ring[SONDE_FLOW_RINGS]; // share of each ring in the gate, by power
   uint64_t pulses;
   double echo[BINS][2]; // of the last pulses, pulse p at p % BINS
-  double cosine[BINS], sine[BINS], window[BINS];
   scatterer at[SCATTERERS];
 };
 
@@ -118,10 +118,6 @@ sonde_status sonde_doppler_create(const sonde_doppler_def *def, sonde_doppler **
   }
   d->blood = sqrt(fmax(power, 1));
   weigh_rings(d);
-  for (int k = 0; k < BINS; ++k) {
-    d->cosine[k] = cos(2 * SONDE_PI * k / BINS), d->sine[k] = sin(2 * SONDE_PI * k / BINS);
-    d->window[k] = 0.5 - 0.5 * d->cosine[k];
-  }
   *out = d;
   return SONDE_OK;
 }
@@ -158,73 +154,41 @@ void sonde_doppler_pulse(sonde_doppler *d, const double profile_m_s[SONDE_FLOW_R
         sum[c] / d->blood + noise * sonde_random_normal(def->seed, d->drawn++) + (c ? 0 : wall);
 }
 
-// The echoes of the window in the order of time, without the walls' echo: that does not move and is
-// their mean under the weights, and weighted themselves when `weighted`.
-static void hear(const sonde_doppler *d, bool weighted, double echo[BINS][2]) {
-  double wall[2] = {0, 0}, sum = 0;
-  for (int n = 0; n < BINS; ++n) {
-    const double w = weighted ? d->window[n] : 1;
-    sum += w;
-    for (int c = 0; c < 2; ++c) {
-      echo[n][c] = d->echo[(d->pulses + (uint64_t)n) % BINS][c];
-      wall[c] += w * echo[n][c];
-    }
-  }
+// The echoes of the window in the order of time.
+static void hear(const sonde_doppler *d, double echo[BINS][2]) {
   for (int n = 0; n < BINS; ++n)
-    for (int c = 0; c < 2; ++c)
-      echo[n][c] = (weighted ? d->window[n] : 1) * (echo[n][c] - wall[c] / sum);
+    for (int c = 0; c < 2; ++c) echo[n][c] = d->echo[(d->pulses + (uint64_t)n) % BINS][c];
 }
 
 void sonde_doppler_read(const sonde_doppler *d, sonde_doppler_spectrum *out) {
   SONDE_ASSERT(d && out);
   *out = (sonde_doppler_spectrum){.mean_m_s = 0};
-  double limit = sonde_doppler_limit(&d->def), away = cos(d->def.angle_rad) < 0 ? -1 : 1;
+  const double limit = sonde_doppler_limit(&d->def);
   for (int b = 0; b < BINS; ++b) out->velocity_m_s[b] = limit * (b - BINS / 2) / (BINS / 2);
   if (d->pulses < BINS) return;
-  double echo[BINS][2];
-  hear(d, true, echo);
+  double echo[BINS][2], power[BINS];
+  hear(d, echo);
+  spectrum_take(echo, BINS, power);
   // Towards the probe is a positive shift; away from it the spectrum is turned round.
-  double sorted[BINS], whole = 0;
+  const bool away = cos(d->def.angle_rad) < 0;
   for (int b = 0; b < BINS; ++b) {
-    int shift = b - BINS / 2, f = (int)(away * shift + BINS) % BINS;
-    double sum[2] = {0, 0};
-    for (int n = 0; n < BINS; ++n) {
-      int turn = (int)(((unsigned)f * (unsigned)n) % BINS);
-      sum[0] += echo[n][0] * d->cosine[turn] + echo[n][1] * d->sine[turn];
-      sum[1] += echo[n][1] * d->cosine[turn] - echo[n][0] * d->sine[turn];
-    }
-    bool kept = abs(shift) * d->def.pulse_hz / BINS >= fmax(d->def.filter_hz, 0);
-    out->power[b] = kept ? sum[0] * sum[0] + sum[1] * sum[1] : 0;
-    int i = b;
-    for (; i > 0 && sorted[i - 1] > out->power[b]; --i) sorted[i] = sorted[i - 1];
-    sorted[i] = out->power[b];
+    const int shift = b - BINS / 2;
+    const bool kept = abs(shift) * d->def.pulse_hz / BINS >= fmax(d->def.filter_hz, 0);
+    out->power[b] = kept ? power[away ? (BINS - b) % BINS : b] : 0;
   }
-  // The lower third is noise, whose power is spread exponentially: its mean is the 33 % quantile
-  // over 0.405. One bin in 8,000 of noise reaches nine times the mean.
-  double mean_noise = sorted[BINS / 3] / 0.405, above[BINS], moment = 0;
-  for (int b = 0; b < BINS; ++b) {
-    above[b] = fmax(out->power[b] - 9 * mean_noise, 0);
-    whole += above[b], moment += above[b] * out->velocity_m_s[b];
-  }
-  if (!(whole > 12 * mean_noise)) return; // nothing but noise: no flow beyond the filter
-  out->mean_m_s = moment / whole;
-  // The edge on the side of the mean, from outside: neighbours above the noise, since one bin may
-  // be.
-  int from = out->mean_m_s < 0 ? 1 : BINS - 2, step = out->mean_m_s < 0 ? 1 : -1, b = from;
-  double passed = 0;
-  for (; b + step > 0 && b + step < BINS - 1; b += step) {
-    if (passed > 0 || (above[b] > 0 && above[b + step] > 0)) passed += above[b];
-    out->peak_m_s = out->velocity_m_s[b];
-    if (passed > 0.01 * whole) return;
-  }
-  out->peak_m_s = out->mean_m_s;
+  spectrum_read(out->power, out->velocity_m_s, &out->mean_m_s, &out->peak_m_s);
 }
 
 double sonde_doppler_phase_velocity(const sonde_doppler *d) {
   SONDE_ASSERT(d != NULL);
   if (d->pulses < BINS) return 0;
-  double echo[BINS][2], real = 0, imaginary = 0;
-  hear(d, false, echo);
+  double echo[BINS][2], wall[2] = {0, 0}, real = 0, imaginary = 0;
+  hear(d, echo);
+  // The walls do not move: their echo is the mean.
+  for (int n = 0; n < BINS; ++n)
+    for (int c = 0; c < 2; ++c) wall[c] += echo[n][c] / BINS;
+  for (int n = 0; n < BINS; ++n)
+    for (int c = 0; c < 2; ++c) echo[n][c] -= wall[c];
   for (int n = 1; n < BINS; ++n) {
     const double *p = echo[n - 1], *q = echo[n];
     real += p[0] * q[0] + p[1] * q[1], imaginary += p[0] * q[1] - p[1] * q[0];

@@ -1,5 +1,6 @@
 // What flows in the vessels of a pressed model: which segment of the network each section belongs
 // to, what probe and clots leave open of them, flows and profiles at a time.
+#include "flow/gate.h"
 #include "flow/scene.h"
 
 #include "base/base.h"
@@ -121,36 +122,62 @@ void sonde_flow_scene_narrow(const sonde_flow_scene *s, sonde_flow_def *def) {
     }
 }
 
+void sonde_flow_scene_listen(sonde_flow_scene *s, sonde_gate *gate) {
+  SONDE_ASSERT(s != NULL);
+  s->gate = gate;
+}
+
+// How a segment's flow is shared by its veins.
+static void share_out(sonde_flow_scene *s) {
+  sonde_flow unit = s->flow;
+  for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k) {
+    unit.flow_m3_s[k] = 1;
+    for (uint32_t v = 0; v < SONDE_FLOW_VEINS; ++v)
+      s->part[k][v] = sonde_flow_through(&unit, (sonde_flow_segment)k, v);
+    s->main_per_m2[k] = sonde_flow_velocity(&unit, (sonde_flow_segment)k);
+  }
+}
+
 void sonde_flow_scene_run(sonde_flow_scene *s, sonde_flow *flow, double until_s) {
   SONDE_ASSERT(s && flow && isfinite(until_s));
   const double step_s = 1e-3;
-  for (int k = 0; k < SONDE_FLOW_SEGMENTS && !(flow->time_s == s->flow.time_s); ++k)
-    sonde_flow_steady(sonde_flow_velocity(flow, (sonde_flow_segment)k), s->profile[k]);
-  while (flow->time_s < until_s - 1e-9) {
-    sonde_flow_step(flow, step_s);
-    for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k) {
-      const double area = sonde_flow_area(flow, (sonde_flow_segment)k, 0);
-      if (area > 0)
-        sonde_flow_follow(s->profile[k], sqrt(area / SONDE_PI),
-                          sonde_flow_velocity(flow, (sonde_flow_segment)k), step_s);
-    }
+  // One profile for all arteries, of the size of the thigh's.
+  const double artery_radius_m = 3.5e-3;
+  const double beats_hz = flow->def.heart_rate_hz;
+  if (!(flow->time_s == s->flow.time_s)) {
+    enum { SAMPLES = 64 };
+    double wave[SAMPLES];
+    for (int k = 0; k < SAMPLES; ++k) wave[k] = sonde_flow_artery((double)k / SAMPLES);
+    const double beat = beats_hz * flow->time_s;
+    sonde_flow_pulsed(wave, SAMPLES, artery_radius_m, beats_hz, beat - floor(beat),
+                      s->artery_profile);
+    for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k)
+      sonde_flow_steady(sonde_flow_velocity(flow, (sonde_flow_segment)k), s->profile[k]);
   }
   s->flow = *flow;
-  enum { SAMPLES = 64 };
-  double wave[SAMPLES];
-  for (int k = 0; k < SAMPLES; ++k) wave[k] = sonde_flow_artery((double)k / SAMPLES);
-  const double beat = flow->def.heart_rate_hz * flow->time_s;
-  s->artery_m_s = sonde_flow_artery(beat);
-  // One profile for all arteries, of the size of the thigh's.
-  const double radius_m = 3.5e-3;
-  sonde_flow_pulsed(wave, SAMPLES, radius_m, flow->def.heart_rate_hz, beat - floor(beat),
-                    s->artery_profile);
+  share_out(s);
+  while (s->flow.time_s < until_s - 1e-9) {
+    sonde_flow_step(&s->flow, step_s);
+    for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k) {
+      const double area = sonde_flow_area(&s->flow, (sonde_flow_segment)k, 0);
+      if (area > 0)
+        sonde_flow_follow(s->profile[k], sqrt(area / SONDE_PI),
+                          sonde_flow_velocity(&s->flow, (sonde_flow_segment)k), step_s);
+    }
+    s->artery_m_s = sonde_flow_artery(beats_hz * s->flow.time_s);
+    sonde_flow_follow(s->artery_profile, artery_radius_m, s->artery_m_s, step_s);
+    if (s->gate) gate_step(s->gate, s, step_s);
+  }
+  s->artery_m_s = sonde_flow_artery(beats_hz * s->flow.time_s);
+  *flow = s->flow;
+  share_out(s);
 }
 
 sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_scene *s) {
   SONDE_ASSERT(s != NULL);
   sonde_flow_scene_memory memory = {.flow = s->flow};
   memcpy(memory.profile_m_s, s->profile, sizeof s->profile);
+  memcpy(memory.artery_m_s, s->artery_profile, sizeof s->artery_profile);
   return memory;
 }
 
@@ -158,6 +185,7 @@ void sonde_flow_scene_recall(sonde_flow_scene *s, const sonde_flow_scene_memory 
   SONDE_ASSERT(s && memory);
   s->flow = memory->flow;
   memcpy(s->profile, memory->profile_m_s, sizeof s->profile);
+  memcpy(s->artery_profile, memory->artery_m_s, sizeof s->artery_profile);
 }
 
 double sonde_flow_scene_velocity(const sonde_flow_scene *s, uint32_t vessel, sonde_pose pose) {

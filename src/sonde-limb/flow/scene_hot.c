@@ -12,7 +12,7 @@ typedef struct piece {
   const sonde_vessel_state *low, *high;
   sonde_vec3 along, other; // from centre to centre; beside the flat axis
   double length2;
-  double scale[2]; // of the profile at both ends, so that what a clot leaves of it carries the flow
+  double gain[2]; // of the mean velocity at both ends, so that what a clot leaves carries the flow
   sonde_vec3 offset; // world: from where it is to where the picture draws it
 } piece;
 
@@ -31,8 +31,8 @@ static double clot_scale(const piece *p, uint32_t i) {
   return free > 0 ? (1 - solid) * all / free : 1;
 }
 
-// Velocity of the blood at a place of the picture's plane, world; false beside the blood.
-static bool blood_at(const piece *p, sonde_vec3 drawn, sonde_vec3 *velocity) {
+// What the blood at a place of the picture's plane is and how it moves; false beside the blood.
+static bool blood_at(const piece *p, sonde_vec3 drawn, scene_blood *blood) {
   const sonde_flow_scene *s = p->scene;
   const sonde_vec3 d = v_sub(v_sub(drawn, p->offset), p->low->centre_m);
   const double share = v_dot(d, p->along) / p->length2;
@@ -52,21 +52,19 @@ static bool blood_at(const piece *p, sonde_vec3 drawn, sonde_vec3 *velocity) {
   const double along_m = low->along_m + share * (low[1].along_m - low->along_m);
   if (solid > 0 && -a > 1 - 2 * solid + sonde_clot_surface(p->vessel, along_m, b)) return false;
   const scene_section *section = &s->section[p->vessel][p->i];
-  const double mean =
-      (1 - share) * scene_mean(s, p->vessel, p->i) + share * scene_mean(s, p->vessel, p->i + 1);
-  // The profile of the segment's main vein or the arteries, scaled to this mean; else a parabola.
   const bool artery = s->interior->course[p->vessel].kind == SONDE_VESSEL_ARTERY;
-  const double *profile = artery ? s->artery_profile : s->profile[section->segment];
-  const double whole = artery ? s->artery_m_s : sonde_flow_velocity(&s->flow, section->segment);
-  const double at = radius * (SONDE_FLOW_RINGS - 1), least_m_s = 1e-3;
-  const int k = (int)at;
-  double speed = 2 * mean * (1 - radius * radius);
-  if (artery || (section->vein == 0 && fabs(whole) > least_m_s))
-    speed = (profile[k] + (at - k) * (profile[k + 1] - profile[k])) *
-            (fabs(whole) > least_m_s ? mean / whole : 1);
-  const double scale = (1 - share) * p->scale[0] + share * p->scale[1];
+  // The profile of the segment's main vein or the arteries, scaled to the section's mean velocity;
+  // else a parabola.
+  const bool profiled = artery || (section->vein == 0 && s->main_per_m2[section->segment] > 0);
   const double heart = section->upwards * (artery ? -1 : 1);
-  *velocity = v_scale(p->along, heart * scale * speed / sqrt(p->length2));
+  *blood = (scene_blood){.drive = artery     ? SCENE_ARTERY
+                                  : profiled ? (int)section->segment
+                                             : SONDE_FLOW_SEGMENTS + (int)section->segment,
+                         .factor = (1 - share) * p->gain[0] + share * p->gain[1],
+                         .ring = radius * (SONDE_FLOW_RINGS - 1),
+                         .along = v_scale(p->along, heart / sqrt(p->length2))};
+  if (profiled && !artery) blood->factor /= s->main_per_m2[section->segment];
+  if (!profiled) blood->factor *= 2 * (1 - radius * radius);
   return true;
 }
 
@@ -92,38 +90,73 @@ static void lay(const piece *p, sonde_pose probe, const sonde_colour_box *box,
     for (int line = first[0]; line < last[0]; ++line) {
       sonde_colour_cell *cell = &cells[row * SONDE_COLOUR_LINES + line];
       double xz[2];
-      sonde_vec3 velocity;
+      scene_blood blood;
       if (cell->vessel != SONDE_COLOUR_NO_VESSEL) continue;
       sonde_colour_place(box, (uint32_t)line, (uint32_t)row, xz);
-      if (!blood_at(p, pose_apply(probe, vec3(xz[0], 0, xz[1])), &velocity)) continue;
-      const double towards = -v_dot(velocity, beam);
-      *cell = (sonde_colour_cell){.towards_m_s = (float)towards,
-                                  .across_m_s =
-                                      (float)sqrt(fmax(v_norm2(velocity) - towards * towards, 0)),
-                                  .vessel = p->vessel};
+      if (!blood_at(p, pose_apply(probe, vec3(xz[0], 0, xz[1])), &blood)) continue;
+      const double speed = scene_speed(p->scene, &blood),
+                   towards = -speed * v_dot(blood.along, beam);
+      *cell =
+          (sonde_colour_cell){.towards_m_s = (float)towards,
+                              .across_m_s = (float)sqrt(fmax(speed * speed - towards * towards, 0)),
+                              .vessel = p->vessel};
     }
+}
+
+// The piece of a vessel behind its section i, laid where the picture draws it; false when it is far
+// from the picture's plane or deeper than `bottom_m`.
+static bool find_piece(const sonde_flow_scene *s, const sonde_echo *echo, double bottom_m,
+                       uint32_t v, uint32_t i, piece *p) {
+  const sonde_interior *in = s->interior;
+  const sonde_pose probe = sonde_truth_pose(echo);
+  *p = (piece){
+      .scene = s, .vessel = v, .i = i, .low = &in->state[v][i], .high = &in->state[v][i + 1]};
+  const sonde_vec3 at = pose_apply_inverse(probe, p->low->centre_m);
+  const double near_m = 0.03; // longer than a piece and a lumen together
+  if (fabs(at.y) > near_m || at.z < -near_m || at.z > bottom_m + near_m) return false;
+  p->along = v_sub(p->high->centre_m, p->low->centre_m), p->length2 = v_norm2(p->along);
+  if (!(p->length2 > 0)) return false;
+  // Where another segment begins, the lower one's flow goes on to the piece's end.
+  const bool same = s->section[v][i].segment == s->section[v][i + 1].segment;
+  for (uint32_t end = 0; end < 2; ++end)
+    p->gain[end] = clot_scale(p, i + end) * scene_gain(s, v, i + (same ? end : 0));
+  p->other = v_cross(p->low->axis, p->low->flat_axis);
+  p->offset = q_rotate(probe.rotation, v_sub(sonde_truth_drawn_at(echo, p->low->centre_m), at));
+  return true;
 }
 
 void sonde_flow_scene_cells(const sonde_flow_scene *s, const sonde_echo *echo,
                             const sonde_colour_box *box, sonde_colour_cell *cells) {
   SONDE_ASSERT(s && echo && box && cells);
   const sonde_interior *in = s->interior;
-  const sonde_pose probe = sonde_truth_pose(echo);
   for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
     cells[i] = (sonde_colour_cell){.vessel = SONDE_COLOUR_NO_VESSEL};
   for (uint32_t v = 0; v < in->vessel_count; ++v)
     for (uint32_t i = 0; i + 1 < in->course[v].count; ++i) {
-      piece p = {
-          .scene = s, .vessel = v, .i = i, .low = &in->state[v][i], .high = &in->state[v][i + 1]};
-      const sonde_vec3 at = pose_apply_inverse(probe, p.low->centre_m);
-      const double near_m = 0.03; // longer than a piece and a lumen together
-      if (fabs(at.y) > near_m || at.z < -near_m || at.z > box->bottom_m + near_m) continue;
-      p.along = v_sub(p.high->centre_m, p.low->centre_m), p.length2 = v_norm2(p.along);
-      if (!(p.length2 > 0)) continue;
-      p.scale[0] = clot_scale(&p, i), p.scale[1] = clot_scale(&p, i + 1);
-      p.other = v_cross(p.low->axis, p.low->flat_axis);
-      const sonde_vec3 drawn = sonde_truth_drawn_at(echo, p.low->centre_m);
-      p.offset = q_rotate(probe.rotation, v_sub(drawn, at));
-      lay(&p, probe, box, cells);
+      piece p;
+      if (find_piece(s, echo, box->bottom_m, v, i, &p)) lay(&p, sonde_truth_pose(echo), box, cells);
+    }
+}
+
+void scene_find_blood(const sonde_flow_scene *s, const sonde_echo *echo, const sonde_vec3 *drawn,
+                      uint32_t count, scene_blood *blood) {
+  SONDE_ASSERT(s && echo && drawn && blood && count > 0);
+  const sonde_interior *in = s->interior;
+  // A ball that holds the places, and what may reach into it.
+  double far_m = 0;
+  for (uint32_t n = 0; n < count; ++n) {
+    blood[n].drive = -1;
+    far_m = fmax(far_m, v_distance(drawn[n], drawn[0]));
+  }
+  const double depth_m = pose_apply_inverse(sonde_truth_pose(echo), drawn[0]).z + far_m;
+  for (uint32_t v = 0; v < in->vessel_count; ++v)
+    for (uint32_t i = 0; i + 1 < in->course[v].count; ++i) {
+      piece p;
+      const double reach_m = 0.03 + far_m;
+      if (v_distance(in->state[v][i].centre_m, drawn[0]) > reach_m ||
+          !find_piece(s, echo, depth_m, v, i, &p))
+        continue;
+      for (uint32_t n = 0; n < count; ++n)
+        if (blood[n].drive < 0 && !blood_at(&p, drawn[n], &blood[n])) blood[n].drive = -1;
     }
 }
