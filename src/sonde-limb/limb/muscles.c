@@ -132,6 +132,7 @@ enum { SAMPLES = 2400 };
 typedef struct section {
   uint32_t count;
   float x[SAMPLES], y[SAMPLES]; // in mean radii
+  float owned[SAMPLES];         // distance to the nearest cell: squared, less the weight
   double spacing, cell_area;    // in mean radii
 } section;
 
@@ -161,16 +162,16 @@ typedef struct row_seeds {
 } row_seeds;
 
 // Area of every cell in mean radii squared. A sample at a boundary counts for both sides by its
-// distance to it. `least` gets how much nearer a cell would have to be to own any sample.
+// distance to it.
 static void measure_cells(const struct limb_muscles *m, uint32_t row, const row_seeds *known,
-                          const section *s, double *area, double *least) {
+                          section *s, double *area) {
   enum { LANES = 16 };
-  float x[LIMB_SEEDS], y[LIMB_SEEDS], weight[LIMB_SEEDS], d[LIMB_SEEDS], nearer[LIMB_SEEDS];
+  float x[LIMB_SEEDS], y[LIMB_SEEDS], weight[LIMB_SEEDS], d[LIMB_SEEDS];
   const uint32_t all = (known->count + LANES - 1) / LANES * LANES;
   for (uint32_t k = 0; k < all; ++k) {
     const limb_seed *seed = k < known->count ? &m->seed[row][known->at[k]] : NULL;
     x[k] = seed ? seed->x : 0, y[k] = seed ? seed->y : 0;
-    weight[k] = seed ? seed->weight : -1e6F, nearer[k] = 1e30F;
+    weight[k] = seed ? seed->weight : -1e6F;
   }
   memset(area, 0, LIMB_CELLS * sizeof *area);
   for (uint32_t i = 0; i < s->count; ++i) {
@@ -189,7 +190,7 @@ static void measure_cells(const struct limb_muscles *m, uint32_t row, const row_
         d2 = d[k], second = k;
       }
     }
-    for (uint32_t k = 0; k < all; ++k) nearer[k] = d[k] - d1 < nearer[k] ? d[k] - d1 : nearer[k];
+    s->owned[i] = d1;
     float sx = x[first] - x[second], sy = y[first] - y[second];
     double apart = (double)sqrtf(sx * sx + sy * sy) + 1e-6;
     double part = 0.5 + 0.5 * (double)(d2 - d1) / apart / s->spacing;
@@ -197,9 +198,23 @@ static void measure_cells(const struct limb_muscles *m, uint32_t row, const row_
     area[known->cell[first]] += part * s->cell_area;
     area[known->cell[second]] += (1 - part) * s->cell_area;
   }
-  for (uint32_t k = 0; k < LIMB_CELLS; ++k) least[k] = INFINITY;
-  for (uint32_t k = 0; k < known->count; ++k)
-    least[known->cell[k]] = fmin(least[known->cell[k]], nearer[k]);
+}
+
+// How much nearer a cell would have to be to own any sample, as measure_cells() found them.
+static double lack_of(const struct limb_muscles *m, uint32_t row, uint32_t cell, const section *s) {
+  double lack = INFINITY;
+  for (uint32_t k = 0; k < m->seed_count; ++k) {
+    if (m->cell_of[k] != cell) continue;
+    const limb_seed *seed = &m->seed[row][k];
+    float least = 1e30F;
+    for (uint32_t i = 0; i < s->count; ++i) {
+      float dx = s->x[i] - seed->x, dy = s->y[i] - seed->y;
+      float d = dx * dx + dy * dy - seed->weight - s->owned[i];
+      least = d < least ? d : least;
+    }
+    lack = fmin(lack, (double)least);
+  }
+  return lack;
 }
 
 static void set_weight(struct limb_muscles *m, uint32_t row, uint32_t cell, double by) {
@@ -209,26 +224,25 @@ static void set_weight(struct limb_muscles *m, uint32_t row, uint32_t cell, doub
 
 // Weights that give each cell its target: damped steps, each cell by its own error; an absent cell
 // keeps the greatest weight at which it owns nothing.
-static void solve_row(struct limb_muscles *m, uint32_t row, const row_seeds *known,
-                      const section *s) {
-  double unit = m->radius[row] * m->radius[row], area[LIMB_CELLS], least[LIMB_CELLS];
+static void solve_row(struct limb_muscles *m, uint32_t row, const row_seeds *known, section *s) {
+  double unit = m->radius[row] * m->radius[row], area[LIMB_CELLS];
   double gain[LIMB_CELLS], before[LIMB_CELLS] = {0};
   for (uint32_t k = 0; k < LIMB_CELLS; ++k) gain[k] = 0.45;
   for (uint32_t pass = 0; pass < 70; ++pass) {
-    measure_cells(m, row, known, s, area, least);
+    measure_cells(m, row, known, s, area);
     double worst = 0;
     for (uint32_t k = 0; k < LIMB_CELLS; ++k) {
       double wanted = m->target[row][k] / unit, error = wanted - area[k];
       if (!known->cells[k]) continue;
       if (wanted <= 0) {
         // Absent: just out of every sample's reach; in the first pass at once.
-        double out = least[k] - 0.04;
+        double out = lack_of(m, row, k, s) - 0.04;
         set_weight(m, row, k, area[k] > 0 ? -0.03 - 0.5 * area[k] : pass ? fmin(out, 0.1) : out);
         worst = fmax(worst, area[k] > 0 ? area[k] / 0.004 * 0.02 : 0);
         continue;
       }
       if (area[k] <= 0) {
-        set_weight(m, row, k, least[k] + 0.004);
+        set_weight(m, row, k, lack_of(m, row, k, s) + 0.004);
         worst = 1;
         continue;
       }
@@ -242,10 +256,11 @@ static void solve_row(struct limb_muscles *m, uint32_t row, const row_seeds *kno
   }
   // What is absent goes entirely; its neighbours gain less than a sample.
   for (uint32_t pass = 0, owned = 1; pass < 40 && owned; ++pass) {
-    measure_cells(m, row, known, s, area, least);
+    measure_cells(m, row, known, s, area);
     owned = 0;
     for (uint32_t k = 0; k < LIMB_CELLS; ++k)
-      if (known->cells[k] && m->target[row][k] <= 0 && (area[k] > 0 || least[k] < 0.03))
+      if (known->cells[k] && m->target[row][k] <= 0 &&
+          (area[k] > 0 || lack_of(m, row, k, s) < 0.03))
         set_weight(m, row, k, -0.02 - area[k]), owned = 1;
   }
   for (uint32_t k = 0; k < LIMB_CELLS; ++k) m->area[row][k] = area[k] * unit;

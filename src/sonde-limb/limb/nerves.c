@@ -21,24 +21,24 @@ static void lay(struct limb_vessels *v, uint32_t which, const char *name, double
   const double h = 2e-4, size = nerve->radius + 0.5 * nerve->half;
   for (int pass = 0; pass < 40; ++pass)
     for (uint32_t k = 0; k < nerve->count; ++k) {
-      sonde_vec3 *p = &nerve->point[k];
-      const sonde_vec3 axis[2] = {{1, 0, 0}, {0, 1, 0}};
-      double gap[5], bone[5];
-      for (int i = 0; i < 5; ++i) {
-        sonde_vec3 at = i == 0 ? *p : v_madd(*p, i % 2 ? h : -h, axis[(i - 1) / 2]);
-        const double xyz[3] = {at.x, at.y, at.z};
-        uint32_t branch;
-        double arc, wall;
-        gap[i] = limb_vessels_lumen(v, at, &branch, &arc, &wall);
-        gap[i] -= wall + size + 0.0008;
-        bone[i] = limb_bone_distance(v->limb, xyz, NULL) - size - 0.002;
-      }
-      sonde_vec3 step = {0};
+      sonde_vec3 *p = &nerve->point[k], step = {0};
       for (int from = 0; from < 2; ++from) {
-        const double *d = from == 0 ? gap : bone;
-        if (d[0] >= 0) continue;
-        sonde_vec3 out = v_unit(vec3(d[1] - d[2], d[3] - d[4], 0), vec3(0, 1, 0));
-        step = v_madd(step, fmin(-0.6 * d[0], 0.002), out);
+        // Room to the vessels, then to the bones: here and, where it lacks, to either side.
+        const sonde_vec3 axis[2] = {{1, 0, 0}, {0, 1, 0}};
+        double gap[5];
+        for (int i = 0; i < 5 && (i == 0 || gap[0] < 0); ++i) {
+          sonde_vec3 at = i == 0 ? *p : v_madd(*p, i % 2 ? h : -h, axis[(i - 1) / 2]);
+          const double xyz[3] = {at.x, at.y, at.z};
+          uint32_t branch;
+          double arc, wall;
+          if (from == 0)
+            gap[i] = limb_vessels_lumen(v, at, &branch, &arc, &wall) - (wall + size + 0.0008);
+          else
+            gap[i] = limb_bone_distance(v->limb, xyz, NULL) - size - 0.002;
+        }
+        if (gap[0] >= 0) continue;
+        sonde_vec3 out = v_unit(vec3(gap[1] - gap[2], gap[3] - gap[4], 0), vec3(0, 1, 0));
+        step = v_madd(step, fmin(-0.6 * gap[0], 0.002), out);
       }
       double level, degrees, f;
       limb_place_of(v->limb, *p, &level, &degrees, &f);

@@ -199,11 +199,11 @@ sonde_status limb_vessels_make(sonde_limb *limb, sonde_error *error) {
       --v->branch[b].valves;
   }
   if (!status) status = limb_vessels_count_faults(v, error);
-  if (!status) status = limb_vessels_index(v, error);
+  if (!status) status = limb_vessels_index(v, false, error);
   if (status) return status;
   limb_nerves_lay(v);
   limb_lymph_lay(v);
-  return limb_vessels_index(v, error);
+  return limb_vessels_index(v, true, error);
 }
 
 void limb_vessels_destroy(struct limb_vessels *v) {

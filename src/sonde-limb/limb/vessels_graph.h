@@ -208,7 +208,8 @@ void limb_lymph_lay(struct limb_vessels *v);
 sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool close,
                                 sonde_error *error);
 sonde_status limb_vessels_count_faults(struct limb_vessels *v, sonde_error *error);
-sonde_status limb_vessels_index(struct limb_vessels *v, sonde_error *error);
+// @param fine false: larger cells, made sooner, that answer slower and the same
+sonde_status limb_vessels_index(struct limb_vessels *v, bool fine, sonde_error *error);
 // Nearest branch: signed distance to the lumen, its place; joints smoothed.
 double limb_vessels_lumen(const struct limb_vessels *v, sonde_vec3 p, uint32_t *branch, double *arc,
                           double *wall);

@@ -4,13 +4,14 @@
 
 #include <string.h>
 
-enum { LEAF_PIECES = 24, DEEPEST = 7 };
+enum { LEAF_PIECES = 24, DEEPEST = 7, COARSE = 6 };
 // A cube farther than 50 mm from every piece keeps the one that is nearest to its middle; one with
 // few pieces stays whole where they are far for its size.
 enum { FAR_PIECES = 64 };
 static const double FAR_M = 0.05, FAR = 1;
 static const double SLACK_M =
     0.0025; // by which a piece may be farther than the nearest and still count
+static const double ROUNDED_M = 2e-6;  // error of a distance in single precision
 static const double SHEATH_M = 0.0009; // loose fat around the walls of deep vessels
 // More than a wall, its sheath in the groin and the rounding of a joint together: 1.3 + 2.4 + 0.5.
 static const double CLEAR_M = 0.006;
@@ -39,9 +40,20 @@ static vessel_piece piece_between(sonde_vec3 a, sonde_vec3 b, double from, doubl
                         owner, at};
 }
 
+// Pieces as rows of numbers, so that a processor measures several at once.
+enum { AX, AY, AZ, LX, LY, LZ, INVERSE, RADIUS, GROWS, HALF, SX, SY, SZ, NUMBERS };
+typedef struct rows {
+  uint32_t vessels, count; // of vessels, which come first, and with nerves
+  uint32_t *piece;         // [count] ascending
+  float *number[NUMBERS];  // [count] each
+} rows;
+
 typedef struct growing {
   struct limb_vessels *v;
-  uint32_t cell_room, list_room;
+  uint32_t cell_room, list_room, deepest;
+  rows level[DEEPEST + 1]; // of the cells on the way down
+  float *distance;         // [pieces] of the rows of a cell
+  uint32_t *kept;          // [pieces] rows
   bool failed;
 } growing;
 
@@ -54,53 +66,68 @@ static bool reserve(growing *g, void **array, uint32_t *room, uint32_t needed, s
   return true;
 }
 
-// Keeps of `from` the pieces that count in a cube of centre `middle` and half edge `half`.
-static void split(growing *g, uint32_t cell, const uint32_t *from, uint32_t count,
-                  sonde_vec3 middle, double half, uint32_t depth) {
+// As piece_distance(), of all rows, within ROUNDED_M: between 0 and 1 is (|u| - |u - 1| + 1) / 2.
+static void measure_rows(const rows *r, sonde_vec3 at, float *restrict distance) {
+  const float x = (float)at.x, y = (float)at.y, z = (float)at.z;
+  float *const *n = r->number;
+  for (uint32_t k = 0; k < r->count; ++k) {
+    float ox = x - n[AX][k], oy = y - n[AY][k], oz = z - n[AZ][k];
+    float u = (ox * n[LX][k] + oy * n[LY][k] + oz * n[LZ][k]) * n[INVERSE][k];
+    u = 0.5F * (fabsf(u) - fabsf(u - 1) + 1);
+    ox -= u * n[LX][k], oy -= u * n[LY][k], oz -= u * n[LZ][k];
+    const float half = n[HALF][k], side = ox * n[SX][k] + oy * n[SY][k] + oz * n[SZ][k];
+    const float aside = 0.5F * (fabsf(side + half) - fabsf(side - half));
+    ox -= aside * n[SX][k], oy -= aside * n[SY][k], oz -= aside * n[SZ][k];
+    distance[k] = sqrtf(ox * ox + oy * oy + oz * oz) - n[RADIUS][k] - u * n[GROWS][k];
+  }
+}
+
+// Keeps of the level's pieces those that count in a cube of centre `middle` and half edge `half`.
+static void split(growing *g, uint32_t cell, sonde_vec3 middle, double half, uint32_t depth) {
   struct limb_vessels *v = g->v;
-  double reach = half * sqrt(3.0), least = INFINITY, nearest_vessel = INFINITY, t;
-  uint32_t *kept = SONDE_NEW(uint32_t, count);
-  double *distance = SONDE_NEW(double, count);
-  uint32_t n = 0;
-  if (!kept || !distance) g->failed = true;
-  for (uint32_t k = 0; k < count && !g->failed; ++k) {
-    const vessel_piece *piece = &v->piece[from[k]];
-    distance[k] = piece_distance(piece, middle, &t);
-    least = least_of(least, distance[k]);
-    if (piece->owner < v->branches) nearest_vessel = least_of(nearest_vessel, distance[k]);
-  }
+  const rows *from = &g->level[depth];
+  const double reach = half * sqrt(3.0) + ROUNDED_M;
+  const float *d = g->distance;
+  measure_rows(from, middle, g->distance);
+  float least = INFINITY, nearest_vessel;
+  for (uint32_t k = 0; k < from->vessels; ++k) least = d[k] < least ? d[k] : least;
+  nearest_vessel = least;
+  for (uint32_t k = from->vessels; k < from->count; ++k) least = d[k] < least ? d[k] : least;
   // Nerves count where they are nearer than vessels; joints are rounded near them only.
-  for (uint32_t k = 0; k < count && !g->failed; ++k) {
-    bool vessel = v->piece[from[k]].owner < v->branches;
-    double slack = nearest_vessel - reach > SLACK_M ? 0 : SLACK_M;
-    double most = vessel ? nearest_vessel : least;
-    if (most - reach > FAR_M ? distance[k] <= most : distance[k] < most + 2 * reach + slack)
-      kept[n++] = from[k];
+  const double slack = (double)nearest_vessel - reach > SLACK_M ? 0 : SLACK_M;
+  uint32_t n = 0, vessels = 0;
+  for (int nerves = 0; nerves < 2; ++nerves) {
+    const float most = nerves ? least : nearest_vessel;
+    const bool far = (double)most - reach > FAR_M;
+    const float limit = far ? most : most + (float)(2 * reach + slack);
+    const uint32_t end = nerves ? from->count : from->vessels;
+    for (uint32_t k = nerves ? from->vessels : 0; k < end; ++k) g->kept[n] = k, n += d[k] <= limit;
+    if (!nerves) vessels = n;
   }
-  sonde_free(distance);
-  if (!g->failed &&
-      (depth >= DEEPEST || n <= LEAF_PIECES || (n <= FAR_PIECES && least > FAR * reach))) {
+  if (depth >= g->deepest || n <= LEAF_PIECES || (n <= FAR_PIECES && (double)least > FAR * reach)) {
     if (reserve(g, (void **)(void *)&v->listed, &g->list_room, v->listed_count + n,
                 sizeof *v->listed)) {
-      v->cell[cell] = (vessel_cell){0, v->listed_count, n, (float)(least - reach)};
-      memcpy(v->listed + v->listed_count, kept, n * sizeof *kept);
-      v->listed_count += n;
+      v->cell[cell] = (vessel_cell){0, v->listed_count, n, (float)((double)least - reach)};
+      for (uint32_t k = 0; k < n; ++k) v->listed[v->listed_count++] = from->piece[g->kept[k]];
     }
-  } else if (!g->failed &&
-             reserve(g, (void **)(void *)&v->cell, &g->cell_room, v->cells + 8, sizeof *v->cell)) {
+  } else if (reserve(g, (void **)(void *)&v->cell, &g->cell_room, v->cells + 8, sizeof *v->cell)) {
     uint32_t child = v->cells;
     v->cell[cell] = (vessel_cell){child, 0, 0, 0};
     v->cells += 8;
+    rows *to = &g->level[depth + 1];
+    to->count = n, to->vessels = vessels;
+    for (uint32_t k = 0; k < n; ++k) to->piece[k] = from->piece[g->kept[k]];
+    for (int i = 0; i < NUMBERS; ++i)
+      for (uint32_t k = 0; k < n; ++k) to->number[i][k] = from->number[i][g->kept[k]];
     for (uint32_t k = 0; k < 8 && !g->failed; ++k) {
       double h = 0.5 * half;
       sonde_vec3 at = v_add(middle, vec3(k & 1 ? h : -h, k & 2 ? h : -h, k & 4 ? h : -h));
-      split(g, child + k, kept, n, at, h, depth + 1);
+      split(g, child + k, at, h, depth + 1);
     }
   }
-  sonde_free(kept);
 }
 
-sonde_status limb_vessels_index(struct limb_vessels *v, sonde_error *error) {
+sonde_status limb_vessels_index(struct limb_vessels *v, bool fine, sonde_error *error) {
   uint32_t most = v->places + LIMB_NERVES * 160;
   sonde_free(v->piece);
   sonde_free(v->cell);
@@ -130,15 +157,34 @@ sonde_status limb_vessels_index(struct limb_vessels *v, sonde_error *error) {
          edge = most_of(high.z - low.z, most_of(high.x - low.x, high.y - low.y)) + 2 * margin;
   v->low = v_sub(v_scale(v_add(low, high), 0.5), vec3(edge / 2, edge / 2, edge / 2));
   v->edge = edge;
-  growing g = {v, 0, 0, false};
-  uint32_t *all = SONDE_NEW(uint32_t, v->pieces);
-  if (!all || !reserve(&g, (void **)(void *)&v->cell, &g.cell_room, 1, sizeof *v->cell))
-    g.failed = true;
-  for (uint32_t k = 0; k < v->pieces && !g.failed; ++k) all[k] = k;
-  v->cells = 1;
-  if (!g.failed)
-    split(&g, 0, all, v->pieces, v_add(v->low, vec3(edge / 2, edge / 2, edge / 2)), edge / 2, 0);
-  sonde_free(all);
+  growing g = {.v = v, .deepest = fine ? DEEPEST : COARSE};
+  const uint32_t levels = g.deepest + 1, count = v->pieces;
+  uint32_t *piece = SONDE_NEW(uint32_t, (size_t)(levels + 1) * count);
+  float *number = SONDE_NEW(float, ((size_t)levels * NUMBERS + 1) * count);
+  g.failed = !piece || !number ||
+             !reserve(&g, (void **)(void *)&v->cell, &g.cell_room, 1, sizeof *v->cell);
+  if (!g.failed) {
+    for (uint32_t k = 0; k < levels; ++k) {
+      g.level[k] = (rows){.piece = piece + (size_t)k * count};
+      for (uint32_t i = 0; i < NUMBERS; ++i)
+        g.level[k].number[i] = number + (size_t)(k * NUMBERS + i) * count;
+    }
+    g.kept = piece + (size_t)levels * count, g.distance = number + (size_t)levels * NUMBERS * count;
+    rows *all = &g.level[0];
+    for (uint32_t k = 0; k < count; ++k) {
+      const vessel_piece *p = &v->piece[k];
+      const double of[NUMBERS] = {p->a.x,     p->a.y,     p->a.z,    p->along.x, p->along.y,
+                                  p->along.z, p->inverse, p->radius, p->grows,   p->half,
+                                  p->side.x,  p->side.y,  p->side.z};
+      for (int i = 0; i < NUMBERS; ++i) all->number[i][k] = (float)of[i];
+      all->piece[k] = k, all->vessels += p->owner < v->branches;
+    }
+    all->count = count;
+    v->cells = 1;
+    split(&g, 0, v_add(v->low, vec3(edge / 2, edge / 2, edge / 2)), edge / 2, 0);
+  }
+  sonde_free(piece);
+  sonde_free(number);
   return g.failed ? sonde_fail_memory(error) : SONDE_OK;
 }
 
