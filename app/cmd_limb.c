@@ -11,7 +11,8 @@
 static const char VERB[] = "limb";
 
 typedef struct options {
-  const char *atlas, *skin, *levels, *model, *film;
+  const char *atlas, *skin, *levels, *model, *film, *measured;
+  double measured_from_m;
   bool json, stations;
   long seed;
   int sex, side, position; // -1: drawn, right, at rest
@@ -19,8 +20,12 @@ typedef struct options {
 } options;
 
 static void prepare(void *to) {
-  *(options *)to =
-      (options){.seed = 1, .sex = -1, .side = -1, .position = -1, .known = sonde_limb_unknown()};
+  *(options *)to = (options){.seed = 1,
+                             .sex = -1,
+                             .side = -1,
+                             .position = -1,
+                             .measured_from_m = NAN,
+                             .known = sonde_limb_unknown()};
 }
 
 static const char *const SEXES[] = {"female", "male", NULL};
@@ -46,6 +51,12 @@ static const app_option TABLE[] = {
     OPT_OUTPUT(skin, "skin", "FILE", "write the skin as .ply, .obj or .stl, mm"),
     OPT_OUTPUT(model, "model", "FILE",
                "write the limb as a model (.sonde) that can be pressed and imaged"),
+    OPT_TEXT(measured, "measured", "FILE",
+             "a fitted thigh (.sonde, from sonde fit) that takes its part of the limb: the body "
+             "is as thick, the springs are those of the measurements"),
+    OPT_REAL(measured_from_m, "measured-from-mm", "X", -50, 400, 1e-3,
+             "where that thigh's z = 0 lies below the hip joint; default its middle at that of the "
+             "thigh"),
     OPT_JSON(json),
     OPT_GROUP("Parameters of the body; what is not given is drawn")};
 
@@ -87,6 +98,8 @@ static int check(void *from) {
   double level[MOST_LEVELS];
   if (a->levels && !a->atlas) return app_usage_error(VERB, "--levels needs --atlas");
   if (!read_levels(a->levels, level)) return APP_BAD_INPUT;
+  if (!isnan(a->measured_from_m) && !a->measured)
+    return app_usage_error(VERB, "--measured-from-mm needs --measured");
   if (a->sex >= 0) a->known.sex = a->sex ? SONDE_SEX_MALE : SONDE_SEX_FEMALE;
   a->known.side = a->side == 1 ? SONDE_LIMB_LEFT : SONDE_LIMB_RIGHT;
   return APP_OK;
@@ -111,7 +124,8 @@ static void find_stations(const sonde_limb *limb, const sonde_limb_pose *pose,
 
 static const double GIRTHS[] = {0.12, 0.25, 0.5, 0.75, 0.88, 1, 1.15, 1.28, 1.5, 1.75, 1.86};
 
-static void print_json(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose) {
+static void print_json(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose,
+                       const sonde_limb_part_fit *fit) {
   sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
@@ -142,6 +156,13 @@ static void print_json(const options *a, const sonde_limb *limb, const sonde_lim
     app_json_close();
   }
   app_json_close();
+  if (a->measured) {
+    app_json_object("measured");
+    app_json_text("file", a->measured);
+    app_json("from_level:%g to_level:%g girth_rms_percent:%g", fit->from_level, fit->to_level,
+             100 * fit->girth_rms);
+    app_json_close();
+  }
   if (pose) app_json_text("position", POSITIONS[a->position]);
   if (a->stations) {
     sonde_limb_station station[SONDE_LIMB_STATIONS];
@@ -174,7 +195,8 @@ static void print_json(const options *a, const sonde_limb *limb, const sonde_lim
   app_json_end();
 }
 
-static void print_text(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose) {
+static void print_text(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose,
+                       const sonde_limb_part_fit *fit) {
   sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
@@ -184,6 +206,10 @@ static void print_text(const options *a, const sonde_limb *limb, const sonde_lim
     printf("%-20s %8.2f  %s\n", p[k].name, *sonde_parameter_of(&body, &p[k]) / p[k].unit,
            p[k].text);
   }
+  if (a->measured)
+    printf("\n%s from level %.2f to %.2f: girths within %.1f %% (rms), springs of the "
+           "measurements\n",
+           a->measured, fit->from_level, fit->to_level, 100 * fit->girth_rms);
   printf("\nlevel   girth mm\n");
   for (size_t k = 0; k < sizeof GIRTHS / sizeof *GIRTHS; ++k)
     printf("%5.2f   %8.0f\n", GIRTHS[k], 1e3 * sonde_limb_girth(limb, GIRTHS[k]));
@@ -259,7 +285,15 @@ static int run(void *from) {
   sonde_mesh skin = {0};
   sonde_error error = {0};
   app_progress_begin("making the limb");
-  sonde_status status = sonde_limb_draw(&a->known, (uint64_t)a->seed, &body, &error);
+  sonde_model *model = NULL, *subject = NULL;
+  sonde_limb_body known = a->known;
+  sonde_limb_part part = {NULL, a->measured_from_m};
+  sonde_limb_part_fit fit = {0};
+  sonde_status status = a->measured ? sonde_model_load(a->measured, &subject, &error) : SONDE_OK;
+  part.model = subject;
+  if (!status && subject)
+    status = sonde_limb_part_body(&part, (uint64_t)a->seed, &known, &fit, &error);
+  if (!status) status = sonde_limb_draw(&known, (uint64_t)a->seed, &body, &error);
   if (!status) status = sonde_limb_create(&body, &limb, &error);
   if (!status && a->position >= 0) {
     sonde_limb_setting setting = sonde_limb_setting_usual((sonde_limb_position)a->position);
@@ -283,19 +317,25 @@ static int run(void *from) {
     status = write_table(limb, pose, path, &error);
   }
   if (!status && a->film) status = limb_film_write(limb, pose, a->film, &error);
-  sonde_model *model = NULL;
   sonde_limb_model_def def = sonde_limb_model_def_default();
+  char provenance[256];
+  if (subject) {
+    snprintf(provenance, sizeof provenance, "Synthetic limb; springs of %.60s (%.150s)",
+             subject->name, subject->provenance);
+    def.part = &part, def.provenance = provenance;
+  }
   sonde_limb_setting setting;
   if (pose) setting = sonde_limb_pose_setting(pose), def.setting = &setting;
   if (!status && a->model) status = sonde_limb_model(&body, &def, &model, &error);
   if (!status && a->model) status = sonde_model_save(model, a->model, &error);
   sonde_model_destroy(model);
+  sonde_model_destroy(subject);
   if (!status && a->skin)
     status = pose ? sonde_limb_pose_skin(pose, 0.004, &skin, &error)
                   : sonde_limb_skin(limb, 0.004, &skin, &error);
   if (!status && a->skin) status = sonde_mesh_save(a->skin, 1e-3, &skin, &error);
   app_progress_end();
-  if (!status) (a->json ? print_json : print_text)(a, limb, pose);
+  if (!status) (a->json ? print_json : print_text)(a, limb, pose, &fit);
   sonde_mesh_clear(&skin);
   sonde_limb_pose_destroy(pose);
   sonde_limb_destroy(limb);

@@ -16,6 +16,30 @@
 extern "C" {
 #endif
 
+/** A part of a thigh that a robot measured. Its model has the axes of a limb's: x medial, y to the
+ * front, z downwards, of a right leg. */
+typedef struct sonde_limb_part {
+  const sonde_model *model; /**< as sonde fit makes it: two layers, exponent 2; the caller's */
+  double from_m; /**< of its z = 0 below the hip joint; NaN: its middle at that of the thigh */
+} sonde_limb_part;
+
+/** How a body goes with a part. */
+typedef struct sonde_limb_part_fit {
+  double from_level, to_level; /**< where the part lies: 0 hip, 1 knee joint line */
+  double girth_rms;            /**< of ln(girth of the subject / girth of the limb) on the part */
+} sonde_limb_part_fit;
+
+/**
+ * Takes from a measured part what a body does not know yet: girths of thigh and knee that follow
+ * the subject's, fat, skin and the femur's diameter at the middle of the thigh.
+ * @param[in,out] known numbers that are known stay @param seed of what is drawn for the rest
+ * @return ARGUMENT for a subject that is no thigh along z, or lies beyond the thigh
+ * @thread owner
+ */
+SONDE_API sonde_status sonde_limb_part_body(const sonde_limb_part *part, uint64_t seed,
+                                            sonde_limb_body *known, sonde_limb_part_fit *fit,
+                                            sonde_error *error);
+
 /** How the model of a limb is made. */
 typedef struct sonde_limb_model_def {
   const char *name, *provenance;
@@ -25,6 +49,9 @@ typedef struct sonde_limb_model_def {
   double damping_s;   /**< time of the normal dampers; 20 ms */
   /** NULL: the straight limb, lying; else in this position, whose pressures its veins have */
   const sonde_limb_setting *setting;
+  /** NULL, or whose springs the skin has where the part lies; 30 mm from its ends they begin to go
+   * over into those that follow from the layers */
+  const sonde_limb_part *part;
 } sonde_limb_model_def;
 SONDE_API sonde_limb_model_def sonde_limb_model_def_default(void); /**< @thread any */
 

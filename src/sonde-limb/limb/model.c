@@ -3,19 +3,22 @@
 
 #include "limb/bones.h"
 #include "limb/map.h"
+#include "limb/part.h"
 #include "limb/pose.h"
 #include "tissue/layer_springs.h"
 
 #include <string.h>
 
 enum { COURSE_SITES = 24, SITES = SONDE_LIMB_STATIONS + COURSE_SITES };
+// A subject's sites are numbered from PART_SITES on; with more than MOST_PARTS none is kept.
+enum { PART_SITES = 100, MOST_PARTS = 200 };
 static const double FINE_REACH_M = 0.004, BONE_EDGE_M = 0.004, LEAST_TISSUE_M = 0.004;
 // A tendon yields less than muscle: a layer of it counts as muscle of this share of its thickness.
 static const double TENDON_SHARE = 0.2;
 enum { DEPTHS = 12 }; // places between fascia and bone where the tissue is asked for
 
 sonde_limb_model_def sonde_limb_model_def_default(void) {
-  return (sonde_limb_model_def){"limb", "Synthetic limb, not measured", 0.006, 0.003, 1, 0.02,
+  return (sonde_limb_model_def){"limb", "Synthetic limb, not measured", 0.006, 0.003, 1, 0.02, NULL,
                                 NULL};
 }
 
@@ -224,11 +227,29 @@ static sonde_vec3 held_axis(const limb_held *held, sonde_vec3 rest) {
   return limb_side_point(held->limb, v_unit(m_mul_v(gradient, down), down));
 }
 
-// Sites stand at the stations and along the main vein. Between two stations the side from which the
-// probe looks at the vein turns evenly from that of one to that of the other.
+// A site on the skin at a level and an angle.
+static sonde_site skin_site(const limb_held *held, uint32_t id, double level, double angle) {
+  const sonde_limb *limb = held->limb;
+  sonde_vec3 rest = vec3(0, 0, 0), middle = sonde_limb_point(limb, level, angle, 0), p[3];
+  const double shift[3][2] = {{0.01, 0}, {0, 0.02}, {0, 0}};
+  for (int j = 0; j < 3; ++j) {
+    double l = level + shift[j][0], a = angle + shift[j][1];
+    double out = limb_skin_radius(limb, l, a) / limb_fascia_radius(limb, l, a);
+    p[j] = rest = sonde_limb_point(limb, l, a, out);
+    if (held->pose) p[j] = sonde_limb_pose_point(held->pose, rest);
+  }
+  if (held->pose) middle = sonde_limb_pose_point(held->pose, middle);
+  sonde_vec3 n = v_unit(v_cross(v_sub(p[0], p[2]), v_sub(p[1], p[2])), vec3(0, 1, 0));
+  sonde_vec3 out = v_sub(p[2], middle);
+  return site_at(limb, id, p[2], v_dot(n, out) < 0 ? v_neg(n) : n, held_axis(held, rest));
+}
+
+// Sites stand at the stations, along the main vein, and where a subject was measured. Between two
+// stations the side from which the probe looks at the vein turns evenly from that of one to that of
+// the other.
 static void lay_sites(const limb_held *held, const chain *veins,
                       const sonde_limb_station station[SONDE_LIMB_STATIONS],
-                      sonde_site site[SITES]) {
+                      const limb_measured *measured, uint32_t parts, sonde_site *site) {
   enum { LAST = 9 }; // station at the popliteal vein's end
   const sonde_limb *limb = held->limb;
   const limb_held straight = {.limb = held->limb};
@@ -246,20 +267,12 @@ static void lay_sites(const limb_held *held, const chain *veins,
     while (i + 1 < LAST && level[i + 1] < at) ++i;
     double t = clamp((at - level[i]) / (level[i + 1] - level[i]), 0, 1);
     double side = angle[i] + t * remainder(angle[i + 1] - angle[i], 2 * SONDE_PI);
-    sonde_vec3 rest = vec3(0, 0, 0), middle = sonde_limb_point(limb, at, side, 0), p[3];
-    const double shift[3][2] = {{0.01, 0}, {0, 0.02}, {0, 0}};
-    for (int j = 0; j < 3; ++j) {
-      double l = at + shift[j][0], a = side + shift[j][1];
-      double out = limb_skin_radius(limb, l, a) / limb_fascia_radius(limb, l, a);
-      p[j] = rest = sonde_limb_point(limb, l, a, out);
-      if (held->pose) p[j] = sonde_limb_pose_point(held->pose, rest);
-    }
-    if (held->pose) middle = sonde_limb_pose_point(held->pose, middle);
-    sonde_vec3 n = v_unit(v_cross(v_sub(p[0], p[2]), v_sub(p[1], p[2])), vec3(0, 1, 0));
-    sonde_vec3 out = v_sub(p[2], middle);
-    site[SONDE_LIMB_STATIONS + k] =
-        site_at(limb, SONDE_LIMB_STATIONS + k, p[2], v_dot(n, out) < 0 ? v_neg(n) : n,
-                held_axis(held, rest));
+    site[SONDE_LIMB_STATIONS + k] = skin_site(held, SONDE_LIMB_STATIONS + k, at, side);
+  }
+  for (uint32_t k = 0; k < parts; ++k) {
+    double at, side;
+    limb_measured_site(measured, k, &at, &side);
+    site[SITES + k] = skin_site(held, PART_SITES + k, at, side);
   }
 }
 
@@ -328,8 +341,9 @@ enum { MOST_NUMBERS = 128 };
 
 /* ---- the model ---------------------------------------------------------------------------- */
 
-static sonde_status make(const limb_held *held, const sonde_limb_model_def *def, sonde_mesh *skin,
-                         sonde_mesh *bones, sonde_model **out, sonde_error *error) {
+static sonde_status make(const limb_held *held, const sonde_limb_model_def *def,
+                         const limb_measured *measured, sonde_mesh *skin, sonde_mesh *bones,
+                         sonde_model **out, sonde_error *error) {
   const sonde_limb *limb = held->limb;
   const sonde_limb_pose *pose = held->pose;
   sonde_mesh part = {0};
@@ -346,17 +360,19 @@ static sonde_status make(const limb_held *held, const sonde_limb_model_def *def,
   }
   if (status) return status;
   sonde_limb_station station[SONDE_LIMB_STATIONS];
-  sonde_site site[SITES];
+  sonde_site site[SITES + MOST_PARTS];
+  const uint32_t parts =
+      measured && def->part->model->site_count <= MOST_PARTS ? def->part->model->site_count : 0;
   chain veins = find_chain(limb, VEINS), arteries = find_chain(limb, ARTERIES);
   if (pose)
     sonde_limb_pose_stations(pose, station);
   else
     sonde_limb_stations(limb, station);
-  lay_sites(held, &veins, station, site);
+  lay_sites(held, &veins, station, measured, parts, site);
   sonde_model_def built = sonde_model_def_default();
   built.name = def->name, built.provenance = def->provenance;
   built.skin = skin, built.femur = bones;
-  built.sites = site, built.site_count = SITES;
+  built.sites = site, built.site_count = SITES + parts;
   built.fine_edge_m = def->fine_edge_m, built.fine_reach_m = FINE_REACH_M;
   built.law = sonde_layered_law(def->stiffness, def->damping_s);
   status = sonde_model_build(&built, out, error);
@@ -391,8 +407,9 @@ static sonde_status make(const limb_held *held, const sonde_limb_model_def *def,
     to[4] = pose->setting.knee_flexion_rad;
   }
   lay_springs(held, def, model);
+  if (measured) limb_measured_springs(measured, model);
   // A site has the springs of the node nearest to it.
-  for (uint32_t k = 0; k < SITES; ++k) {
+  for (uint32_t k = 0; k < SITES + parts; ++k) {
     uint32_t at =
         v_nearest(model->surface.vertices, model->surface.vertex_count, model->sites[k].position_m);
     model->sites[k].k0_n_m3 = model->k0_n_m3[at], model->sites[k].xm_m = model->xm_m[at];
@@ -417,7 +434,10 @@ sonde_status sonde_limb_model(const sonde_limb_body *body, const sonde_limb_mode
   sonde_status status = sonde_limb_create(body, &held.limb, error);
   if (!status && def->setting)
     status = sonde_limb_pose_create(held.limb, def->setting, &held.pose, error);
-  if (!status) status = make(&held, def, &skin, &bones, model, error);
+  limb_measured *measured = NULL;
+  if (!status && def->part) status = limb_measured_make(&held, def->part, &measured, error);
+  if (!status) status = make(&held, def, measured, &skin, &bones, model, error);
+  limb_measured_destroy(measured);
   sonde_mesh_clear(&skin);
   sonde_mesh_clear(&bones);
   if (status) {
