@@ -4,6 +4,7 @@
 #include "fit_doubts.h"
 #include "fit_report.h"
 #include "fit_sample.h"
+#include "fit_solid.h"
 #include "fit_bulk.h"
 #include "options.h"
 
@@ -25,6 +26,12 @@ typedef struct options {
   double fine_m, inplane_n_m, tangential_n_m3, zero_sd_m, tare_sd_n;
   long starts, seed;
   bool zero, tare, json, profile, identify, layers, accept;
+  sonde_fit_solid_def hyperelastic; // of --solid
+  const char *at, *check;
+  double prior[SONDE_SOLID_LAYERS][2]; // shear modulus, kPa, and exponent
+  int contact;
+  long depths;
+  bool solid, beside;
 } options;
 
 enum { BODY_LIMB, BODY_OTHER };
@@ -42,12 +49,19 @@ static void prepare(void *to) {
   o->zero_sd_m = 1e-3 * 5;
   o->tare_sd_n = 2;
   o->seed = 1;
+  o->hyperelastic = sonde_fit_solid_def_default();
+  for (int k = 0; k < SONDE_SOLID_LAYERS; ++k) {
+    o->prior[k][0] = 1e-3 * o->hyperelastic.contact.layer[k].shear_pa;
+    o->prior[k][1] = o->hyperelastic.contact.layer[k].exponent;
+  }
+  o->depths = 7;
 }
 
 static const char *const HOLD_OUTS[] = {"sites", "probe", "depth", NULL};
 static const char *const WEIGHTS[] = {"absolute", "relative", NULL};
 static const char *const LOSSES[] = {"squares", "huber", "student", NULL};
 static const char *const BODIES[] = {"limb", "other", NULL};
+static const char *const CONTACTS[] = {"bonded", "slip", NULL};
 static const char *const EXPONENTS[] = {"1", "2", "3", "auto", NULL};
 
 static const app_option TABLE[] = {
@@ -155,7 +169,38 @@ static const app_option TABLE[] = {
     OPT_FLAG(accept, "accept-implausible",
              "fit measurements outside what is known of tissue, with a warning; a table in other "
              "units, or one whose forces do not rise, is refused all the same"),
-    OPT_JSON(json)};
+    OPT_JSON(json),
+    OPT_GROUP("Hyperelastic solid"),
+    OPT_FLAG(solid, "solid",
+             "fit shear modulus and exponent of muscle, fat and skin in the solid of sonde solve "
+             "instead, and write the table of moduli that sonde solve --moduli takes"),
+    OPT_TEXT(at, "at", "LIST", "sites to fit, with commas between; default all"),
+    OPT_TEXT(check, "check", "LIST",
+             "sites to predict with what was found, or all: every other one; default none"),
+    OPT_INTEGER(depths, "depths", "N", 0, 1000,
+                "rows of each curve that count, spread over it; 0: all"),
+    OPT_WORD(contact, "contact", "KIND", CONTACTS,
+             "how the probes touched: the skin under them held to them, or sliding without "
+             "friction"),
+    OPT_REAL(hyperelastic.contact.rounding_m, "rounding-mm", "R", 0, 50, 1e-3,
+             "rounding around the flat part of the probes"),
+    OPT_NUMBERS(prior[SONDE_SOLID_MUSCLE], "muscle-prior", "MU:A", -1e4, 1e4,
+                "believed beforehand: shear modulus in kPa and exponent of the muscle"),
+    OPT_NUMBERS(prior[SONDE_SOLID_FAT], "fat-prior", "MU:A", -1e4, 1e4, "the same of the fat"),
+    OPT_NUMBERS(prior[SONDE_SOLID_SKIN], "skin-prior", "MU:A", -1e4, 1e4, "the same of the skin"),
+    OPT_REAL(hyperelastic.ln_shear_sd, "shear-sd", "SD", 1e-3, 10, 1,
+             "how loosely: standard deviation of ln MU"),
+    OPT_REAL(hyperelastic.ln_exponent_sd, "exponent-sd", "SD", 1e-3, 2, 1, "and of ln A"),
+    OPT_REAL(hyperelastic.relative_sd, "unexplained", "SD", 1e-4, 1, 1,
+             "share of the forces that no solid of such layers explains"),
+    OPT_REAL(hyperelastic.force_sd_n, "noise-n", "SD", 1e-6, 100, 1, "of the sensor"),
+    OPT_REAL(hyperelastic.mesh.edge_m, "edge-mm", "E", 0.1, 50, 1e-3,
+             "of the solid's faces under the probe"),
+    OPT_REAL(hyperelastic.mesh.growth, "growth", "G", 1.05, 3, 1,
+             "from face to face away from the probe"),
+    OPT_FLAG(beside, "beside",
+             "also fit the springs to all sites and print what they say of the same rows with "
+             "the site left out")};
 
 // All that was found.
 typedef struct fit_outcome {
@@ -180,6 +225,21 @@ static int check(void *from) {
                ? app_usage_error(VERB,
                                  "--sample goes without measurements, surface, sites and model")
                : APP_OK;
+  if (o->solid) {
+    sonde_fit_solid_def *def = &o->hyperelastic;
+    for (int k = 0; k < SONDE_SOLID_LAYERS; ++k) {
+      sonde_hyperelastic *m = &def->contact.layer[k];
+      m->shear_pa = 1e3 * o->prior[k][0], m->exponent = o->prior[k][1];
+      m->bulk_pa = 24 * m->shear_pa;
+    }
+    def->contact.bonded = o->contact == 0;
+    if (o->zero || app_option_given("zero-sd-mm")) def->zero_sd_m = o->zero_sd_m;
+    if (o->tare || app_option_given("tare-sd-n")) def->tare_sd_n = o->tare_sd_n;
+    return o->kind != SONDE_TWO_LAYER || o->report || o->hold_out >= 0 || o->body == BODY_OTHER
+               ? app_usage_error(VERB, "--solid goes without --model, --report, --hold-out and "
+                                       "--body other")
+               : APP_OK;
+  }
   if (o->kind != SONDE_TWO_LAYER) {
     o->bulk.kind = (sonde_model_kind)o->kind;
     return o->report || o->hold_out >= 0
@@ -610,9 +670,23 @@ static int run(void *from) {
     status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &inputs.muscle, &error);
   if (!status) status = sonde_measurements_examine(&inputs.measurements, &out.doubts, &error);
   if (!status) status = decide(a, &out, 0, &error);
-  if (!status && a->kind != SONDE_TWO_LAYER) {
-    char provenance[256];
-    const sonde_model_def def = define_model(a, &inputs, provenance);
+  char provenance[256];
+  const sonde_model_def def = define_model(a, &inputs, provenance);
+  if (!status && a->solid) {
+    const fit_solid_job job = {.def = &def,
+                               .sites = &inputs.sites,
+                               .measurements = &inputs.measurements,
+                               .also = &inputs.also,
+                               .options = &a->hyperelastic,
+                               .at = a->at,
+                               .check = a->check,
+                               .depths = (uint32_t)a->depths,
+                               .beside = a->beside,
+                               .output = a->output,
+                               .json = a->json};
+    status = fit_solid_run(&job, &error);
+    out.result.converged = true;
+  } else if (!status && a->kind != SONDE_TWO_LAYER) {
     const fit_bulk_job job = {&def,     &inputs.sites, &inputs.measurements,
                               &a->bulk, a->output,     a->json};
     status = fit_bulk_run(&job, &error);
@@ -621,7 +695,7 @@ static int run(void *from) {
     status = fit_model(a, &inputs, &out, &error);
   }
   double seconds = app_seconds(CLOCK_MONOTONIC) - start;
-  if (!status && a->kind == SONDE_TWO_LAYER)
+  if (!status && a->kind == SONDE_TWO_LAYER && !a->solid)
     (a->json ? print_json : print_table)(a, &inputs.measurements, &out, seconds);
   int code = status ? app_fail(VERB, &error) : APP_OK;
   if (!status && !out.result.converged)
@@ -640,8 +714,10 @@ static int run(void *from) {
 const app_command cmd_fit = {
     .verb = "fit",
     .summary = "fit a thigh to measurements and write a model file",
-    .usage = "MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
-             "--sample TABLE.csv [--exponent N] [--area-mm2 A --height-mm H] [--json]",
+    .usage =
+        "MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
+        "MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODULI.csv --solid [options]\n"
+        "--sample TABLE.csv [--exponent N] [--area-mm2 A --height-mm H] [--json]",
     .text = "Estimates the normal springs f(x) = x/(a x + b) of every site, carries them over the "
             "refined skin and writes a thigh model. Stage 1 fits every curve by itself; stage 2 "
             "one pair of parameters per site and one uniform edge stiffness, with the neighbours "

@@ -11,7 +11,7 @@ static const double RAD_PER_DEGREE = 3.14159265358979323846 / 180;
 enum { DEPTHS_MOST = 64, POINTS_MOST = 64 };
 
 typedef struct options {
-  const char *model, *probe, *csv;
+  const char *model, *probe, *csv, *moduli;
   long site;
   double block[3]; // m below, NaN: a model
   double depth_m[DEPTHS_MOST];
@@ -108,6 +108,7 @@ static const app_option TABLE[] = {
     OPT_OUTPUT(csv, "csv", "CSV", "write one row per depth, and one per point and depth"),
     OPT_JSON(json),
     OPT_GROUP("Materials"),
+    OPT_TEXT(moduli, "moduli", "FILE", "table of all materials that sonde fit --solid has written"),
     OPT_WORD(energy, "energy", "LAW", ENERGIES, "strain energy of all layers"),
     OPT_NUMBERS(layer[SONDE_SOLID_MUSCLE], "muscle", "MU:A", -1e4, 1e4,
                 "shear modulus in kPa and exponent of the muscle"),
@@ -136,6 +137,10 @@ static int check(void *from) {
   if (block && (o->site >= 0 || app_option_given("MODEL")))
     return app_usage_error(VERB, "--block takes no model and no --site");
   if (!block && o->site < 0) return app_usage_error(VERB, "--site or --block is missing");
+  static const char *const TOLD[] = {"muscle", "fat", "skin", "energy", "bulk-ratio"};
+  for (size_t k = 0; k < sizeof TOLD / sizeof *TOLD && o->moduli; ++k)
+    if (app_option_given(TOLD[k]))
+      return app_usage_error(VERB, "--moduli goes without --%s", TOLD[k]);
   o->def.bonded = o->contact == 1;
   for (int k = 0; k < SONDE_SOLID_LAYERS; ++k)
     o->def.layer[k] = (sonde_hyperelastic){o->energy, 1e3 * o->layer[k][0], o->layer[k][1],
@@ -168,6 +173,7 @@ static sonde_status open_solid(work *w, options *o, sonde_error *error) {
   static const sonde_site middle = {.normal = {0, 0, 1}, .u = {1, 0, 0}, .v = {0, 1, 0}};
   const sonde_site *site = &middle;
   sonde_status status = sonde_probe_create(o->probe, &w->probe, error);
+  if (!status && o->moduli) status = sonde_moduli_load(o->moduli, o->def.layer, error);
   if (status) return status;
   o->mesh.half_u_m = w->probe.half_x_m, o->mesh.half_v_m = w->probe.half_y_m;
   if (!isnan(o->block[0])) {

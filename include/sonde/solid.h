@@ -37,16 +37,36 @@ typedef struct sonde_hyperelastic {
   double bulk_pa;  /**< K > 0 */
 } sonde_hyperelastic;
 
-/** Layers of a solid. */
+/** Layers of a solid, and their names in files. */
 typedef enum sonde_solid_layer {
   SONDE_SOLID_MUSCLE,
   SONDE_SOLID_FAT,
   SONDE_SOLID_SKIN,
   SONDE_SOLID_LAYERS
 } sonde_solid_layer;
+#define SONDE_SOLID_LAYER_NAMES "muscle", "fat", "skin"
 /** Muscle 3.6 kPa, fat 1.1 kPa and skin 40 kPa with Ogden exponents 9, 8 and 9, K = 24 mu: the
  * materials of the finite-element study (docs/solid.md). @thread any */
 SONDE_API sonde_hyperelastic sonde_hyperelastic_default(sonde_solid_layer layer);
+
+/** How well moduli are known, by layer: shear modulus, then exponent. */
+typedef struct sonde_moduli_certainty {
+  double ln_sd[SONDE_SOLID_LAYERS][2];  /**< standard deviations of their logarithms */
+  bool measured[SONDE_SOLID_LAYERS][2]; /**< the measurements say it, not what was assumed before */
+} sonde_moduli_certainty;
+/**
+ * Writes the materials atomically as a table of one row per layer, which holds
+ * layer,energy,shear_kpa,exponent,bulk_ratio, and where `certainty` is not NULL
+ * ln_shear_sd,shear_from,ln_exponent_sd,exponent_from. @thread owner
+ */
+SONDE_API sonde_status sonde_moduli_save(const char *path,
+                                         const sonde_hyperelastic layer[SONDE_SOLID_LAYERS],
+                                         const sonde_moduli_certainty *certainty,
+                                         const char *remark, sonde_error *error);
+/** Reads its first five columns; every layer has to occur once. @return FORMAT, IO @thread owner */
+SONDE_API sonde_status sonde_moduli_load(const char *path,
+                                         sonde_hyperelastic layer[SONDE_SOLID_LAYERS],
+                                         sonde_error *error);
 
 /** A mesh of hexahedra. Corners 0-3 run round one face, 4-7 lie behind them; right-handed. */
 typedef struct sonde_hexes {
@@ -56,6 +76,8 @@ typedef struct sonde_hexes {
   uint8_t *layer;        /**< [count] sonde_solid_layer */
   uint8_t *held;         /**< [node_count] bits 1 2 4: x y z stay */
   uint32_t (*face)[4];   /**< [face_count] skin, counter-clockwise seen from outside */
+  uint32_t lines[3]; /**< of a bent grid: through the layers, along u, along v, with node (l, u, v)
+                          at (l lines[1] + u) lines[2] + v; 0: no grid. It orders the factor */
 } sonde_hexes;
 SONDE_API void sonde_hexes_clear(sonde_hexes *mesh); /**< @thread owner */
 
@@ -143,6 +165,27 @@ SONDE_API sonde_status sonde_equilibrium_find(sonde_equilibrium *equilibrium, so
 /** Displacement (m) of a rest point; false outside of the mesh. @thread owner */
 SONDE_API bool sonde_equilibrium_at(const sonde_equilibrium *equilibrium, sonde_vec3 rest_m,
                                     sonde_vec3 *displacement_m);
+/** Goes back to a state: displacements of all nodes and the pose that they belong to. The next
+ * sonde_equilibrium_find() of that pose starts from there. @thread owner */
+SONDE_API void sonde_equilibrium_restore(sonde_equilibrium *equilibrium, sonde_pose pose,
+                                         const sonde_vec3 *displacement_m);
+/** [mesh node_count] displacements of the state; its own. @thread owner */
+SONDE_API const sonde_vec3 *sonde_equilibrium_state(const sonde_equilibrium *equilibrium);
+
+/** How the force against the probe's way changes: with the way, and with the materials. */
+typedef struct sonde_force_change {
+  double way_n_m;                        /**< tangent stiffness */
+  double ln_shear_n[SONDE_SOLID_LAYERS]; /**< with ln mu, K/mu kept */
+  double exponent_n[SONDE_SOLID_LAYERS]; /**< with the exponent; neo-Hookean 0 */
+} sonde_force_change;
+/**
+ * At the state that sonde_equilibrium_find() has left: one solve with the factor of its last step.
+ * docs/solid_theory.md.
+ * @param way unit, how the probe moves without turning; the force is minus its component along it
+ * @return CONVERGENCE where the equilibrium has no positive stiffness @thread owner
+ */
+SONDE_API sonde_status sonde_equilibrium_change(sonde_equilibrium *equilibrium, sonde_vec3 way,
+                                                sonde_force_change *change, sonde_error *error);
 /** Unknowns of the whole solid and of the skin that may touch. @thread any */
 SONDE_API void sonde_equilibrium_size(const sonde_equilibrium *equilibrium, uint32_t *unknowns,
                                       uint32_t *zone_unknowns);

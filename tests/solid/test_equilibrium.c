@@ -6,6 +6,7 @@
 #include "solid/grid.h"
 
 #include <stdio.h>
+#include <string.h>
 
 static const double kpa = 1e3;
 
@@ -272,6 +273,95 @@ static void one_force_for_one_depth(void **state) {
   drop_bench(&b);
 }
 
+// ---- change of the force ----------------------------------------------------------------------
+
+// Layers of one material each under a rectangle; the force at a depth with these layers.
+static double layered_force(const sonde_hexes *mesh, const sonde_probe *probe,
+                            const sonde_equilibrium_def *def, double depth_m,
+                            sonde_force_change *change) {
+  sonde_error error;
+  sonde_equilibrium *e;
+  sonde_equilibrium_result r;
+  check(sonde_equilibrium_create(mesh, probe, above(0), def, &e, &error), &error);
+  check(sonde_equilibrium_find(e, above(depth_m), &r, &error), &error);
+  if (change) check(sonde_equilibrium_change(e, vec3(0, 0, -1), change, &error), &error);
+  sonde_equilibrium_destroy(e);
+  return r.force_n.z;
+}
+
+// The derivative of the force by depth, by every shear modulus and by every exponent is the
+// difference between two equilibria, whatever the contact; of all shear moduli together it is the
+// force itself where the contact has no stiffness of its own.
+static void force_changes_match_differences(void **state) {
+  (void)state;
+  sonde_error error;
+  sonde_hexes mesh;
+  sonde_probe probe;
+  sonde_hexes_def fine = sonde_hexes_def_default();
+  fine.half_u_m = 8e-3, fine.half_v_m = 4e-3, fine.edge_m = 4e-3, fine.reach_m = 0.03;
+  fine.muscle = 2;
+  check(sonde_probe_create("rect:16x8", &probe, &error), &error);
+  check(sonde_hexes_block(25e-3, 2e-3, 8e-3, &fine, &mesh, &error), &error);
+  for (int contact = 0; contact < 4; ++contact) { // bonded, slip, slip and round, Fung
+    sonde_equilibrium_def def = sonde_equilibrium_def_default();
+    def.bonded = contact == 0, def.tolerance = 1e-11, def.zone_m = 8e-3;
+    def.rounding_m = contact == 2 ? 2e-3 : 0;
+    for (int k = 0; k < SONDE_SOLID_LAYERS && contact == 3; ++k)
+      def.layer[k].energy = SONDE_ENERGY_FUNG, def.layer[k].exponent = 2;
+    const double depth = 6e-3;
+    sonde_force_change change;
+    const double force = layered_force(&mesh, &probe, &def, depth, &change);
+    const double h = 1e-5, high = layered_force(&mesh, &probe, &def, depth + h, NULL);
+    const double slope = (high - layered_force(&mesh, &probe, &def, depth - h, NULL)) / (2 * h);
+    double worst = fabs(change.way_n_m / slope - 1), sum = 0;
+    for (int k = 0; k < 2 * SONDE_SOLID_LAYERS; ++k) {
+      const double step = 1e-3;
+      double two[2];
+      for (int side = 0; side < 2; ++side) {
+        sonde_equilibrium_def other = def;
+        sonde_hyperelastic *m = &other.layer[k / 2];
+        const double by = side ? step : -step;
+        if (k % 2)
+          m->exponent += by;
+        else
+          m->shear_pa *= exp(by), m->bulk_pa *= exp(by);
+        two[side] = layered_force(&mesh, &probe, &other, depth, NULL);
+      }
+      const double want = (two[1] - two[0]) / (2 * step);
+      const double got = k % 2 ? change.exponent_n[k / 2] : change.ln_shear_n[k / 2];
+      worst = fmax(worst, fabs(got - want) / force);
+      sum += k % 2 ? 0 : got;
+    }
+    print_message("contact %d: force %.4f N, slope %.1f N/m, changes off by %.1e\n", contact, force,
+                  change.way_n_m, worst);
+    assert_true(worst <= 1e-5);
+    if (contact == 0) assert_near(sum, force, 1e-5 * force);
+  }
+  sonde_hexes_clear(&mesh);
+  sonde_probe_clear(&probe);
+}
+
+// A state that is restored has the force that it had, and the state of other materials is found
+// from it.
+static void a_state_is_restored(void **state) {
+  (void)state;
+  bench b;
+  sonde_hexes_def fine = sonde_hexes_def_default();
+  fine.half_u_m = fine.half_v_m = 6e-3, fine.edge_m = 6e-3, fine.reach_m = 0.03, fine.muscle = 2;
+  const sonde_equilibrium_def def = one_material(ogden(3 * kpa, 8, 24));
+  make_bench(&b, "rect:12x12", 0.03, &fine, &def);
+  const double force = find(&b, 5e-3).force_n.z;
+  sonde_vec3 *kept = calloc(b.mesh.node_count, sizeof *kept);
+  memcpy(kept, sonde_equilibrium_state(b.e), b.mesh.node_count * sizeof *kept);
+  (void)find(&b, 1e-3);
+  sonde_equilibrium_restore(b.e, above(5e-3), kept);
+  const sonde_equilibrium_result again = find(&b, 5e-3);
+  assert_near(again.force_n.z, force, 1e-9 * force);
+  assert_true(again.steps == 0);
+  free(kept);
+  drop_bench(&b);
+}
+
 // A probe that contains another takes at least as much work, at every depth.
 static void a_larger_probe_never_does_less_work(void **state) {
   (void)state;
@@ -305,6 +395,8 @@ int main(void) {
       cmocka_unit_test(ball_on_a_half_space),
       cmocka_unit_test(energy_equals_work),
       cmocka_unit_test(one_force_for_one_depth),
+      cmocka_unit_test(force_changes_match_differences),
+      cmocka_unit_test(a_state_is_restored),
       cmocka_unit_test(a_larger_probe_never_does_less_work),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -69,6 +69,30 @@ static void gradient_and_stiffness_match_differences(void **state) {
     }
 }
 
+// The change of the forces with the exponent is theirs between two exponents.
+static void change_with_the_exponent_matches_differences(void **state) {
+  (void)state;
+  for (int kind = 0; kind < 3; ++kind) {
+    sonde_hyperelastic m = law(kind);
+    const double a = m.exponent, h = 1e-5;
+    sonde_vec3 rest[8], now[8];
+    double e, change[24], high[24], low[24], worst = 0, most = 0;
+    crooked(1, rest, now);
+    assert_true(sonde_hex_by_exponent(&m, rest, now, change));
+    m.exponent = a + h;
+    assert_true(sonde_hex_evaluate(&m, rest, now, &e, high, NULL));
+    m.exponent = a - h;
+    assert_true(sonde_hex_evaluate(&m, rest, now, &e, low, NULL));
+    for (int k = 0; k < 24; ++k) {
+      worst = fmax(worst, fabs((high[k] - low[k]) / (2 * h) - change[k]));
+      most = fmax(most, fabs(change[k]));
+    }
+    print_message("%s: change with the exponent %.2e N, off by %.1e N\n", NAMES[kind], most, worst);
+    assert_true(worst <= 1e-8 * most);
+    assert_true((most > 0) == (kind != SONDE_ENERGY_NEO_HOOKEAN));
+  }
+}
+
 // Uniaxial and shear moduli at rest are Hooke's with mu and K.
 static void small_strains_meet_hooke(void **state) {
   (void)state;
@@ -170,6 +194,7 @@ static void principal_axes_rebuild_the_matrix(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(gradient_and_stiffness_match_differences),
+      cmocka_unit_test(change_with_the_exponent_matches_differences),
       cmocka_unit_test(small_strains_meet_hooke),
       cmocka_unit_test(laws_meet_in_their_limits),
       cmocka_unit_test(turning_costs_nothing),

@@ -111,8 +111,12 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
   e->target = SONDE_NEW(sonde_vec3, e->zone_count);
   sonde_vec3 *points = SONDE_NEW(sonde_vec3, e->unknown_count);
   if (all && e->imposed && e->target && points) {
+    // Of a grid the lines are what cuts it well: near the probe they lie close together.
+    const uint32_t *lines = mesh->lines, sheet = lines[1] * lines[2];
     for (uint32_t n = 0; n < nodes; ++n)
-      if (e->unknown[n] != SONDE_HELD_CORNER) points[e->unknown[n]] = mesh->node[n];
+      if (e->unknown[n] != SONDE_HELD_CORNER)
+        points[e->unknown[n]] =
+            sheet ? vec3(n / sheet, n / lines[2] % lines[1], n % lines[2]) : mesh->node[n];
     const sonde_symbolic_def how = {.node_count = e->unknown_count,
                                     .last_count = e->zone_count,
                                     .block = 3,
@@ -235,7 +239,7 @@ sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
     result->force_n = v_sub(result->force_n, hold);
     result->torque_nm = v_sub(result->torque_nm, v_cross(arm, hold));
   }
-  if (status) memcpy(e->moved, begin, bytes), e->pose = from;
+  if (status) sonde_equilibrium_restore(e, from, begin);
   sonde_free(begin);
   return status;
 }
@@ -288,6 +292,18 @@ bool sonde_equilibrium_at(const sonde_equilibrium *e, sonde_vec3 rest_m,
     return true;
   }
   return false;
+}
+
+void sonde_equilibrium_restore(sonde_equilibrium *e, sonde_pose pose,
+                               const sonde_vec3 *displacement_m) {
+  SONDE_ASSERT(e != NULL && displacement_m != NULL);
+  memcpy(e->moved, displacement_m, e->mesh->node_count * sizeof *e->moved);
+  e->pose = pose, e->factored = false;
+}
+
+const sonde_vec3 *sonde_equilibrium_state(const sonde_equilibrium *e) {
+  SONDE_ASSERT(e != NULL);
+  return e->moved;
 }
 
 void sonde_equilibrium_size(const sonde_equilibrium *e, uint32_t *unknowns,

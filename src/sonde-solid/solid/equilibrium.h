@@ -25,7 +25,8 @@ struct sonde_equilibrium {
   double *force, *step;             // [3 unknown_count]
   double *schur, *matrix;           // [side * side], side = 3 zone_count
   double *way, *way_trial, *load, *touch, *right, *touch_trial; // [side]
-  double shift; // of the stiffness, over an element's mean diagonal
+  double shift;  // of the stiffness, over an element's mean diagonal
+  bool factored; // the factor is that of the state or of the last step towards it, without shift
 };
 
 static inline uint32_t sonde_zone_first(const sonde_equilibrium *e) {

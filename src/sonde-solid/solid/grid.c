@@ -85,7 +85,8 @@ sonde_status sonde_hexes_bend(const sonde_grid_shape *s, sonde_hexes *mesh, sond
   const uint32_t hexes_v = s->v_count - 1, sheet = hexes_u * hexes_v;
   *mesh = (sonde_hexes){.node_count = levels * s->u_count * s->v_count,
                         .count = (levels - 1) * sheet,
-                        .face_count = sheet};
+                        .face_count = sheet,
+                        .lines = {levels, s->u_count, s->v_count}};
   mesh->node = SONDE_NEW(sonde_vec3, mesh->node_count);
   mesh->corner = (uint32_t(*)[8])sonde_calloc(mesh->count, sizeof *mesh->corner);
   mesh->face = (uint32_t(*)[4])sonde_calloc(mesh->face_count, sizeof *mesh->face);

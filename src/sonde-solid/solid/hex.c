@@ -48,6 +48,27 @@ void sonde_hyperelastic_shape(const sonde_hyperelastic *m, const double stretch2
   }
 }
 
+void sonde_hyperelastic_by_exponent(const sonde_hyperelastic *m, const double stretch2[3],
+                                    double ratio, double by_exponent_pa[3]) {
+  SONDE_ASSERT(ratio > 0);
+  sonde_shape_energy e;
+  const double isochoric = 1 / cbrt(ratio * ratio), a = m->exponent;
+  double change[3] = {0, 0, 0}, sum = 0;
+  // Ogden: t_i = 2 mu/a (b_i - S/3); with a the powers b_i change by b_i ln of their base. Fung:
+  // t_i = exp(a (S - 3)) (..).
+  sonde_hyperelastic_shape(m, stretch2, ratio, &e);
+  for (int i = 0; i < 3; ++i) {
+    const double c = stretch2[i] * isochoric;
+    if (m->energy == SONDE_ENERGY_OGDEN) change[i] = pow(c, 0.5 * a) * 0.5 * log(c);
+    sum += m->energy == SONDE_ENERGY_OGDEN ? change[i] : c;
+  }
+  for (int i = 0; i < 3; ++i)
+    by_exponent_pa[i] = m->energy == SONDE_ENERGY_OGDEN
+                            ? 2 * m->shear_pa / a * (change[i] - sum / 3) - e.first_pa[i] / a
+                        : m->energy == SONDE_ENERGY_FUNG ? (sum - 3) * e.first_pa[i]
+                                                         : 0;
+}
+
 void sonde_principal(sonde_mat3 a, double value[3], double vector[3][3]) {
   static const int pair[3][2] = {{0, 1}, {0, 2}, {1, 2}};
   SONDE_ASSERT(value != NULL && vector != NULL);
@@ -128,11 +149,8 @@ static void add_shape_stiffness(const hex_point *p, const sonde_shape_energy *e,
     }
 }
 
-bool sonde_hex_evaluate(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
-                        const sonde_vec3 now[8], double *energy_j, double f[24], double (*k)[24]) {
-  SONDE_ASSERT(material != NULL && material->shear_pa > 0 && material->bulk_pa > 0);
-  hex_point point[8];
-  double volume = 0, moved = 0, mean[24] = {0};
+// The integration points of an element; @return false: turned inside out at one of them.
+static bool find_points(const sonde_vec3 rest[8], const sonde_vec3 now[8], hex_point point[8]) {
   for (int at = 0; at < 8; ++at) {
     hex_point *p = &point[at];
     const double *sign = sonde_hexahedron_sign[at], gauss = sonde_hexahedron_gauss;
@@ -143,17 +161,39 @@ bool sonde_hex_evaluate(const sonde_hyperelastic *material, const sonde_vec3 res
     SONDE_ASSERT(p->volume > 0);
     p->ratio = sonde_hexahedron_gradients(now, a, b, c, there) / p->volume;
     if (!(p->ratio > 1e-3)) return false;
-    const double w = p->volume * p->ratio;
-    volume += p->volume, moved += w;
     for (int n = 0; n < 8; ++n) {
       const double x[3] = {now[n].x, now[n].y, now[n].z}, r[3] = {g[n].x, g[n].y, g[n].z};
       p->g[n][0] = there[n].x, p->g[n][1] = there[n].y, p->g[n][2] = there[n].z;
-      for (int i = 0; i < 3; ++i) {
-        mean[3 * n + i] += w * p->g[n][i];
+      for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) gradient.m[i][j] += x[i] * r[j];
-      }
     }
     p->left = m_mul(gradient, m_transpose(gradient));
+  }
+  return true;
+}
+
+// Adds the forces of principal Kirchhoff stresses at a point.
+static void add_stress(const hex_point *p, double q[3][3], const double principal_pa[3],
+                       double f[24]) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      double stress = 0;
+      for (int m = 0; m < 3; ++m) stress += q[i][m] * principal_pa[m] * q[j][m];
+      stress *= p->volume;
+      for (int n = 0; n < 8; ++n) f[3 * n + i] += stress * p->g[n][j];
+    }
+}
+
+bool sonde_hex_evaluate(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
+                        const sonde_vec3 now[8], double *energy_j, double f[24], double (*k)[24]) {
+  SONDE_ASSERT(material != NULL && material->shear_pa > 0 && material->bulk_pa > 0);
+  hex_point point[8];
+  double volume = 0, moved = 0, mean[24] = {0};
+  if (!find_points(rest, now, point)) return false;
+  for (int p = 0; p < 8; ++p) {
+    const double w = point[p].volume * point[p].ratio;
+    volume += point[p].volume, moved += w;
+    for (int i = 0; i < 24; ++i) mean[i] += w * point[p].g[i / 3][i % 3];
   }
   const double growth = moved / volume - 1, pressure = material->bulk_pa * growth;
   *energy_j = 0.5 * pressure * growth * volume;
@@ -165,13 +205,7 @@ bool sonde_hex_evaluate(const sonde_hyperelastic *material, const sonde_vec3 res
     sonde_principal(point[p].left, s2, q);
     sonde_hyperelastic_shape(material, s2, point[p].ratio, &e);
     *energy_j += point[p].volume * e.w_pa;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        double stress = 0;
-        for (int m = 0; m < 3; ++m) stress += q[i][m] * e.first_pa[m] * q[j][m];
-        stress *= point[p].volume;
-        for (int n = 0; n < 8; ++n) f[3 * n + i] += stress * point[p].g[n][j];
-      }
+    add_stress(&point[p], q, e.first_pa, f);
     if (k) add_shape_stiffness(&point[p], &e, s2, q, k);
   }
   if (!isfinite(*energy_j)) return false;
@@ -189,5 +223,20 @@ bool sonde_hex_evaluate(const sonde_hyperelastic *material, const sonde_vec3 res
     }
   for (int i = 0; i < 24; ++i)
     for (int j = 0; j < i; ++j) k[i][j] = k[j][i];
+  return true;
+}
+
+bool sonde_hex_by_exponent(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
+                           const sonde_vec3 now[8], double f[24]) {
+  SONDE_ASSERT(material != NULL && f != NULL);
+  hex_point point[8];
+  if (!find_points(rest, now, point)) return false;
+  memset(f, 0, 24 * sizeof *f);
+  for (int p = 0; p < 8; ++p) {
+    double s2[3], q[3][3], by_exponent_pa[3];
+    sonde_principal(point[p].left, s2, q);
+    sonde_hyperelastic_by_exponent(material, s2, point[p].ratio, by_exponent_pa);
+    add_stress(&point[p], q, by_exponent_pa, f);
+  }
   return true;
 }

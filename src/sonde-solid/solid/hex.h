@@ -15,6 +15,10 @@ typedef struct sonde_shape_energy {
 void sonde_hyperelastic_shape(const sonde_hyperelastic *material, const double stretch2[3],
                               double ratio, sonde_shape_energy *energy);
 
+// Change of first_pa with the exponent.
+void sonde_hyperelastic_by_exponent(const sonde_hyperelastic *material, const double stretch2[3],
+                                    double ratio, double by_exponent_pa[3]);
+
 // Eigenvalues and the columns of eigenvectors of a symmetric matrix (Jacobi's rotations).
 void sonde_principal(sonde_mat3 a, double value[3], double vector[3][3]);
 
@@ -23,5 +27,8 @@ void sonde_principal(sonde_mat3 a, double value[3], double vector[3][3]);
 // @return false: turned inside out at an integration point
 bool sonde_hex_evaluate(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
                         const sonde_vec3 now[8], double *energy_j, double f[24], double (*k)[24]);
+// Change of these forces with the exponent; zero for a law without one.
+bool sonde_hex_by_exponent(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
+                           const sonde_vec3 now[8], double f[24]);
 
 #endif

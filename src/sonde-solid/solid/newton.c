@@ -73,6 +73,21 @@ static void stiffness_of(const void *user, uint32_t hex, double (*k)[24]) {
       if (i != row) k[row][i] = k[i][row] = 0;
 }
 
+// The stiffness at the state with this shift, condensed on the zone: e->schur.
+// @return false: what lies below the zone is not positive definite
+static bool condense(sonde_equilibrium *e, double shift) {
+  const size_t side = 3 * (size_t)e->zone_count;
+  const sonde_matrix_source source = {.element = stiffness_of, .user = e};
+  e->shift = shift, e->factored = false;
+  if (!sonde_numeric_factor(&e->numeric, e->symbolic, &source)) return false;
+  const double *lower = sonde_numeric_condensed(&e->numeric);
+  for (size_t j = 0; j < side; ++j)
+    for (size_t i = j; i < side; ++i)
+      e->schur[i * side + j] = e->schur[j * side + i] = lower[j * side + i];
+  e->factored = shift == 0;
+  return true;
+}
+
 // ---- the contact on the condensed solid -----------------------------------------------------
 
 void sonde_equilibrium_face(const sonde_equilibrium *e, const sonde_vec3 *u, uint32_t face,
@@ -265,15 +280,9 @@ bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
     }
     // The condensed stiffness; shifted as little as makes it positive definite.
     uint32_t inner = 0;
-    e->shift = 0;
     for (int shifts = 0; shifts < SHIFTS_MOST && !inner; ++shifts) {
-      if (shifts > 0) e->shift = shifts == 1 ? first_shift : e->shift * more_shift;
-      const sonde_matrix_source source = {.element = stiffness_of, .user = e};
-      if (!sonde_numeric_factor(&e->numeric, e->symbolic, &source)) continue;
-      const double *lower = sonde_numeric_condensed(&e->numeric);
-      for (size_t j = 0; j < side; ++j)
-        for (size_t i = j; i < side; ++i)
-          e->schur[i * side + j] = e->schur[j * side + i] = lower[j * side + i];
+      if (!condense(e, shifts == 0 ? 0 : shifts == 1 ? first_shift : e->shift * more_shift))
+        continue;
       // What the zone itself exerts keeps its precision.
       for (size_t k = 0; k < first + side; ++k) e->step[k] = k < first ? -e->force[k] : 0;
       sonde_numeric_reduce(&e->numeric, e->step);
@@ -290,4 +299,65 @@ bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
     if (!search_line(e, pose, imposing, &s)) return false;
   }
   return false;
+}
+
+// ---- how the force changes ------------------------------------------------------------------
+
+// Motion of the zone with the probe's unit way: e->way; returns the tangent stiffness, NaN where
+// none is positive definite. The contact moves with the probe: (S + C) way = C unit.
+static double follow(sonde_equilibrium *e, sonde_vec3 way, bool bend) {
+  const size_t side = 3 * (size_t)e->zone_count;
+  double stiffness = 0;
+  for (size_t i = 0; i < side; ++i) e->way[i] = v_coordinate(way, (int)(i % 3));
+  if (e->def.bonded) {
+    for (size_t i = 0; i < side; ++i)
+      stiffness += e->way[i] * product(e->schur + i * side, e->way, side);
+    return stiffness;
+  }
+  memset(e->matrix, 0, side * side * sizeof *e->matrix);
+  (void)touch_zone(e, e->pose, e->moved, NULL, bend, e->touch, e->matrix);
+  for (size_t i = 0; i < side; ++i) e->load[i] = product(e->matrix + i * side, e->way, side);
+  stiffness = product(e->load, e->way, side);
+  for (size_t i = 0; i < side * side; ++i) e->matrix[i] += e->schur[i];
+  if (!sonde_cholesky(e->matrix, (uint32_t)side)) return NAN;
+  memcpy(e->way, e->load, side * sizeof *e->way);
+  sonde_cholesky_solve(e->matrix, (uint32_t)side, e->way);
+  return stiffness - product(e->load, e->way, side);
+}
+
+sonde_status sonde_equilibrium_change(sonde_equilibrium *e, sonde_vec3 way,
+                                      sonde_force_change *change, sonde_error *error) {
+  SONDE_ASSERT(e != NULL && change != NULL && fabs(v_norm(way) - 1) < 1e-6);
+  const size_t side = 3 * (size_t)e->zone_count, first = 3 * (size_t)sonde_zone_first(e);
+  *change = (sonde_force_change){.way_n_m = NAN};
+  // Where a contact's edge takes more stiffness than there is, the change goes without it, as
+  // Newton's steps do.
+  if (e->factored || condense(e, 0)) change->way_n_m = follow(e, way, true);
+  if (isnan(change->way_n_m) && e->factored) change->way_n_m = follow(e, way, false);
+  if (isnan(change->way_n_m))
+    return sonde_fail(error, SONDE_CONVERGENCE, "the equilibrium has no positive stiffness");
+  memset(e->step, 0, first * sizeof *e->step);
+  memcpy(e->step + first, e->way, side * sizeof *e->way);
+  sonde_numeric_expand(&e->numeric, e->step);
+  memcpy(e->step + first, e->way, side * sizeof *e->way);
+  // The force is the change of the least energy with the way; its change with a parameter is that
+  // of the tissue's forces at rest, along the motion.
+  for (uint32_t h = 0; h < e->mesh->count; ++h) {
+    sonde_vec3 rest[8], now[8];
+    double energy, f[24], by_exponent[24], shear = 0, exponent = 0;
+    const sonde_hyperelastic *material = corners_of(e, e->moved, h, rest, now);
+    const bool whole = sonde_hex_evaluate(material, rest, now, &energy, f, NULL) &&
+                       sonde_hex_by_exponent(material, rest, now, by_exponent);
+    SONDE_ASSERT(whole); // the state's energy was finite
+    for (int k = 0; k < 24; ++k) {
+      const uint32_t at = e->corner[h][k / 3];
+      if (at == SONDE_HELD_CORNER || e->mesh->held[e->mesh->corner[h][k / 3]] >> k % 3 & 1)
+        continue;
+      const double motion = e->step[3 * (size_t)at + (size_t)(k % 3)];
+      shear += f[k] * motion, exponent += by_exponent[k] * motion;
+    }
+    change->ln_shear_n[e->mesh->layer[h]] += shear;
+    change->exponent_n[e->mesh->layer[h]] += exponent;
+  }
+  return SONDE_OK;
 }
