@@ -2,6 +2,8 @@
 #include "test.h"
 
 #include "base/maths.h"
+#include "base/order.h"
+#include "base/random.h"
 
 #include <locale.h>
 
@@ -195,6 +197,34 @@ static void rotation_matrix_gives_its_quaternion_back(void **state) {
     }
 }
 
+// Halving along an axis parts places as sorting does, whatever their order; leaves are in order.
+static void halves_are_those_of_a_sort(void **state) {
+  (void)state;
+  enum { MOST = 3000, LEAF = 4 };
+  static sonde_vec3 point[MOST];
+  static uint32_t sorted[MOST], halved[MOST];
+  static sonde_ranked scratch[MOST];
+  static uint8_t low[MOST];
+  for (int kind = 0; kind < 5; ++kind) // random, few values, rising, falling, saw
+    for (uint32_t count = 2; count <= MOST; count += count < 40 ? 1 : 493) {
+      for (uint32_t i = 0; i < count; ++i) {
+        const double random = floor(1000 * sonde_random_uniform(1, i));
+        point[i].y = kind == 0   ? random
+                     : kind == 1 ? fmod(random, 3)
+                     : kind == 2 ? i
+                     : kind == 3 ? -(double)i
+                                 : i % 50;
+        sorted[i] = halved[i] = count - 1 - i;
+      }
+      sonde_sort_along(point, 1, sorted, count, scratch);
+      sonde_halve_along(point, 1, halved, count, LEAF, scratch);
+      memset(low, 0, sizeof low);
+      for (uint32_t i = 0; i < count / 2; ++i) low[sorted[i]] = 1;
+      for (uint32_t i = 0; i < count; ++i) assert_int_equal(low[halved[i]], i < count / 2);
+      if (count <= 2 * LEAF + 1) assert_memory_equal(sorted, halved, count * sizeof *sorted);
+    }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(every_status_has_its_own_sentence),
@@ -207,6 +237,7 @@ int main(void) {
       cmocka_unit_test(log_and_progress_reach_their_callbacks),
       cmocka_unit_test(poses_form_a_group),
       cmocka_unit_test(rotation_matrix_gives_its_quaternion_back),
+      cmocka_unit_test(halves_are_those_of_a_sort),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,7 +26,7 @@ static void split(builder *b, uint32_t from, uint32_t to, int depth) {
   sonde_vec3 d = v_sub(spread.high, spread.low);
   int axis = d.y > d.x ? 1 : 0;
   if (d.z > v_coordinate(d, axis)) axis = 2;
-  sonde_sort_along(b->centroids, axis, face + from, to - from, b->keys);
+  sonde_halve_along(b->centroids, axis, face + from, to - from, TREE_LEAF_FACES, b->keys);
   uint32_t middle = from + (to - from) / 2;
   split(b, from, middle, depth + 1);
   node->first = b->tree->node_count;

@@ -34,6 +34,39 @@ static inline void sonde_sort_along(const sonde_vec3 *points, int axis, uint32_t
   for (uint32_t i = 0; i < count; ++i) list[i] = scratch[i].index;
 }
 
+// Puts the lower half of list[count] along an axis first, count / 2 places; scratch [count]. Halves
+// of up to `leaf` places are in order, longer ones are not: ranges shrink round the middle, and the
+// last one, or one that does not shrink, is sorted.
+static inline void sonde_halve_along(const sonde_vec3 *points, int axis, uint32_t *list,
+                                     uint32_t count, uint32_t leaf, sonde_ranked *scratch) {
+  const int64_t middle = count / 2, most = count <= 2 * leaf + 1 ? count : 32;
+  for (uint32_t i = 0; i < count; ++i)
+    scratch[i] = (sonde_ranked){v_coordinate(points[list[i]], axis), list[i]};
+  int64_t first = 0, last = count; // the middle lies within
+  for (int round = 0; round < 64 && last - first > most; ++round) {
+    sonde_ranked three[3] = {scratch[first], scratch[first + (last - first) / 2],
+                             scratch[last - 1]};
+    qsort(three, 3, sizeof *three, sonde_compare_ranked);
+    int64_t low = first, high = last - 1;
+    while (low <= high) {
+      while (sonde_compare_ranked(&scratch[low], &three[1]) < 0) ++low;
+      while (sonde_compare_ranked(&scratch[high], &three[1]) > 0) --high;
+      if (low > high) break;
+      const sonde_ranked other = scratch[low];
+      scratch[low++] = scratch[high], scratch[high--] = other;
+    }
+    // Up to `high` none is above the median of three, from `low` on none below.
+    if (middle <= high)
+      last = high + 1;
+    else if (middle >= low)
+      first = low;
+    else
+      first = middle, last = middle + 1;
+  }
+  qsort(scratch + first, (size_t)(last - first), sizeof *scratch, sonde_compare_ranked);
+  for (uint32_t i = 0; i < count; ++i) list[i] = scratch[i].index;
+}
+
 // Value at a fraction of the way through ascending reals, linear between ranks.
 static inline double sonde_percentile(const double *sorted, uint32_t count, double fraction) {
   SONDE_ASSERT(count > 0 && fraction >= 0 && fraction <= 1);

@@ -40,7 +40,7 @@ static void split(builder *b, uint32_t from, uint32_t to, int depth) {
   sonde_vec3 spread = v_sub(high, low);
   int axis = spread.y > spread.x ? 1 : 0;
   if (spread.z > v_coordinate(spread, axis)) axis = 2;
-  sonde_sort_along(b->centroids, axis, order + from, to - from, b->keys);
+  sonde_halve_along(b->centroids, axis, order + from, to - from, SURFACE_LEAF_FACES, b->keys);
   uint32_t middle = from + (to - from) / 2;
   split(b, from, middle, depth + 1);
   node->first = b->index->node_count;
