@@ -31,23 +31,26 @@ static const app_option TABLE[] = {
     OPT_TEXT(what.frames, "frames", "DIR", "a PNG per image, named by its tick"),
     OPT_TEXT(what.video, "video", "FILE.mp4",
              "a film of 25 pictures per second; needs the program ffmpeg (Debian package ffmpeg)"),
+    OPT_TEXT(what.sequence, "sequence", "FILE",
+             "a tracked sequence for PLUS, 3D Slicer and sonde slice: the images with the probe's "
+             "pose, time, force and area ratios; .igs.mha, .igs.nrrd or .seq.nrrd"),
     OPT_REAL(what.from_s, "from", "S", 0, 1e6, 1, "begin of the part to export, in seconds"),
     OPT_REAL(what.to_s, "to", "S", 0, 1e6, 1, "end of the part to export, in seconds"),
     OPT_FLAG(
         json, "json",
         "print one JSON object: ticks, hash, recorded_hash, ended, same, checks, "
         "different_tick, with --images also images, image_hash, same_images; of an export rows, "
-        "pictures, film_frames")};
+        "pictures, film_frames, tracked_frames")};
 
 static bool exports(const options *s) {
-  return s->what.csv || s->what.json || s->what.video || s->what.frames;
+  return s->what.csv || s->what.json || s->what.video || s->what.frames || s->what.sequence;
 }
 
 static int check(void *from) {
   options *s = from;
   if ((app_option_given("from") || app_option_given("to")) && !exports(s))
-    return app_usage_error("replay",
-                           "--from and --to need --csv, --json-file, --frames or --video");
+    return app_usage_error(
+        "replay", "--from and --to need --csv, --json-file, --frames, --video or --sequence");
   if (s->images && exports(s))
     return app_usage_error("replay", "--images compares and exports nothing");
   if (!(s->what.from_s <= s->what.to_s))
@@ -78,9 +81,13 @@ static int run(void *from) {
   if (!status) status = sonde_player_open(&def, &player, &error);
   if (!status) {
     sonde_progress progress = app_progress();
-    s->what.to_s = fmin(s->what.to_s, sonde_player_info(player)->duration_s);
-    status = exports(s) ? replay_export_run(player, &s->what, &progress, &error)
-                        : sonde_player_check(player, s->images, &progress, &result, &error);
+    const double ends_s = sonde_player_info(player)->duration_s;
+    s->what.to_s = fmin(s->what.to_s, ends_s);
+    status = s->what.from_s > ends_s
+                 ? app_error(&error, SONDE_ARGUMENT, "--from %g s, expected at most %g, the end",
+                             s->what.from_s, ends_s)
+             : exports(s) ? replay_export_run(player, &s->what, &progress, &error)
+                          : sonde_player_check(player, s->images, &progress, &result, &error);
     app_progress_end();
   }
   sonde_player_close(player);
@@ -89,13 +96,15 @@ static int run(void *from) {
   const replay_export *w = &s->what;
   if (exports(s) && s->json) {
     app_json_begin();
-    app_json("rows:%u pictures:%u film_frames:%u", w->rows, w->pictures, w->film_frames);
+    app_json("rows:%u pictures:%u film_frames:%u tracked_frames:%u", w->rows, w->pictures,
+             w->film_frames, w->tracked);
     app_json_end();
     return APP_OK;
   }
   if (w->csv || w->json) printf("%u rows written\n", w->rows);
   if (w->frames) printf("%u pictures written to %s\n", w->pictures, w->frames);
   if (w->video) printf("%u frames of film written to %s\n", w->film_frames, w->video);
+  if (w->sequence) printf("%u tracked frames written to %s\n", w->tracked, w->sequence);
   if (exports(s)) return APP_OK;
   {
     char hash[20], recorded[20], image_hash[20];

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { MOST_TRACKED = 20000 }; // frames of a sequence
 enum { FRAMES_PER_S = 25, CAPTION_SCALE = 2, STRIP = 2 * (CAPTION_HEIGHT * CAPTION_SCALE + 6) };
 
 typedef struct output {
@@ -15,7 +16,8 @@ typedef struct output {
   sonde_file *csv;
   sonde_json_out json; // its file NULL: not wanted
   film *film;
-  uint8_t *picture; // [height][width] of the film
+  sonde_sequence sequence; // count 0: not wanted
+  uint8_t *picture;        // [height][width] of the film
   uint32_t width, height;
 } output;
 
@@ -133,6 +135,29 @@ static bool film_until(output *o, double time_s) {
   return true;
 }
 
+// A frame of the tracked sequence: pixels, transforms, time and the numbers of the table.
+static sonde_status track(output *o, const sonde_frame *frame, const sonde_image *image,
+                          sonde_error *error) {
+  replay_export *what = o->what;
+  column list[COLUMNS];
+  char text[40];
+  if (what->tracked >= o->sequence.count)
+    return app_error(error, SONDE_ARGUMENT,
+                     "more than %u images; choose a part with --from and --to", o->sequence.count);
+  const uint32_t k = what->tracked++;
+  sonde_status status =
+      sonde_sequence_set_picture(&o->sequence, k, frame->snapshot.world_from_probe, image, error);
+  snprintf(text, sizeof text, "%.6f", frame->snapshot.time_s);
+  if (!status) status = sonde_sequence_set(&o->sequence, k, "Timestamp", text, error);
+  columns(o->player, frame, list);
+  for (int i = 0; i < COLUMNS && !status; ++i) {
+    if (!isfinite(list[i].value)) continue;
+    snprintf(text, sizeof text, "%.9g", list[i].value);
+    status = sonde_sequence_set(&o->sequence, k, list[i].name, text, error);
+  }
+  return status;
+}
+
 static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error *error) {
   replay_export *what = o->what;
   bool filmed = !o->film || film_until(o, frame->snapshot.time_s);
@@ -162,13 +187,19 @@ static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error
     }
     what->rows++;
   }
+  sonde_image image = {.width = frame->width,
+                       .height = frame->height,
+                       .width_m = frame->width_m,
+                       .height_m = frame->height_m,
+                       .pixels = (uint8_t *)(uintptr_t)frame->pixels};
+  if (what->sequence) {
+    sonde_status status = track(o, frame, &image, error);
+    if (status) return status;
+  }
   if (what->frames) {
     char path[4200];
     snprintf(path, sizeof path, "%s/image_%08llu.png", what->frames,
              (unsigned long long)frame->snapshot.tick);
-    sonde_image image = {.width = frame->width,
-                         .height = frame->height,
-                         .pixels = (uint8_t *)(uintptr_t)frame->pixels};
     sonde_status status = sonde_image_save_png(&image, path, error);
     if (status) return status;
     what->pictures++;
@@ -213,6 +244,10 @@ sonde_status replay_export_run(sonde_player *player, replay_export *what,
                        : app_error(error, SONDE_MEMORY, "out of memory");
   }
 
+  if (!status && what->sequence) { // room for all images; what stays unused is never touched
+    const uint32_t most = (uint32_t)fmax(fmin((double)info->images, MOST_TRACKED), 1);
+    status = sonde_sequence_create(info->image_width, info->image_height, most, &o.sequence, error);
+  }
   // The heads of the tables.
   column list[COLUMNS] = {0};
   if (!status) columns(o.player, &(sonde_frame){0}, list);
@@ -232,6 +267,15 @@ sonde_status replay_export_run(sonde_player *player, replay_export *what,
   bool keep = status == SONDE_OK || status == SONDE_CANCELLED;
   sonde_error own = {0}, filmed = {0};
   sonde_status first = keep && o.json.file ? print_comments(&o, &own) : SONDE_OK;
+  if (what->sequence && keep && !first && !what->tracked)
+    first = app_error(&own, SONDE_NOT_FOUND, "no image from %g to %g s", what->from_s, what->to_s);
+  if (what->sequence && keep && !first) {
+    const uint32_t made = o.sequence.count;
+    o.sequence.count = what->tracked;
+    first = sonde_sequence_save(what->sequence, &o.sequence, true, &own);
+    o.sequence.count = made;
+  }
+  sonde_sequence_clear(&o.sequence);
   sonde_file *files[2] = {o.csv, o.json.file};
   for (int k = 0; k < 2; ++k)
     if (files[k] && keep && !first)

@@ -6,10 +6,10 @@
 
 typedef struct replay_export {
   const char *recording;
-  const char *csv, *json, *video, *frames; // NULL: not wanted
+  const char *csv, *json, *video, *frames, *sequence; // NULL: not wanted
   double from_s, to_s;
   // filled in
-  uint32_t rows, pictures, film_frames;
+  uint32_t rows, pictures, film_frames, tracked;
 } replay_export;
 
 // Plays from from_s to to_s and writes what is wanted. After a CANCELLED what was written is whole.

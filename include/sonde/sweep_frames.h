@@ -50,6 +50,18 @@ SONDE_API sonde_status sonde_sequence_create(uint32_t width, uint32_t height, ui
                                              sonde_sequence *sequence, sonde_error *error);
 SONDE_API void sonde_sequence_clear(sonde_sequence *sequence); /**< @thread owner */
 
+/** Sets or replaces a field; key and value are copied.
+ *  @param frame or SONDE_WHOLE_FILE @return MEMORY @thread owner */
+SONDE_API sonde_status sonde_sequence_set(sonde_sequence *sequence, uint32_t frame, const char *key,
+                                          const char *value, sonde_error *error);
+/** Sets "<name>Transform" to 16 numbers and its status to OK.
+ *  @param name such as ProbeToReference @param to_from_from in mm; from Image: mm from pixel
+ *  @return MEMORY @thread owner */
+SONDE_API sonde_status sonde_sequence_set_transform(sonde_sequence *sequence, uint32_t frame,
+                                                    const char *name,
+                                                    const sonde_affine *to_from_from,
+                                                    sonde_error *error);
+
 /**
  * Reads a MetaImage (.igs.mha) or NRRD (.igs.nrrd, .seq.nrrd) sequence of 8-bit grey frames, raw or
  * compressed, pixels in the same file. Frames whose status is INVALID are kept.
@@ -101,6 +113,12 @@ SONDE_API sonde_status sonde_sequence_locate(sonde_sequence *sequence,
 
 /** Pixel (u, v, 0) -> m for a picture of the probe's x-z plane, see docs/frames.md. @thread any */
 SONDE_API sonde_affine sonde_slice_plane(sonde_pose world_from_probe, const sonde_image *image);
+/** Gives a frame a picture of that plane: its pixels, ImageToProbe, ProbeToReference and an
+ *  ImageStatus OK. @param image of the sequence's size @return ARGUMENT for another size, MEMORY
+ *  @thread owner */
+SONDE_API sonde_status sonde_sequence_set_picture(sonde_sequence *sequence, uint32_t frame,
+                                                  sonde_pose world_from_probe,
+                                                  const sonde_image *image, sonde_error *error);
 
 typedef enum sonde_slice_method {
   SONDE_SLICE_BRACKET, /**< between the nearest frames on both sides, weighted by distance */

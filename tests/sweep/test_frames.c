@@ -292,6 +292,36 @@ static void invalid_frames_are_kept_and_not_used(void **state) {
   sonde_sequence_clear(&t);
 }
 
+// A picture that is written with its probe's pose comes back in the plane that it was made in.
+static void a_picture_keeps_its_plane(void **state) {
+  (void)state;
+  enum { WIDE = 12, HIGH = 9 };
+  uint8_t pixel[WIDE * HIGH];
+  const sonde_pose probe = {{0.03, -0.02, 0.15}, {0.5, -0.1, 0.7, 0.5}};
+  const sonde_image image = {
+      .width = WIDE, .height = HIGH, .width_m = 0.048, .height_m = 0.036, .pixels = pixel};
+  sonde_sequence s, t;
+  sonde_located located;
+  for (int k = 0; k < WIDE * HIGH; ++k) pixel[k] = (uint8_t)(2 * k);
+  assert_int_equal(sonde_sequence_create(WIDE, HIGH, 2, &s, NULL), SONDE_OK);
+  for (uint32_t k = 0; k < 2; ++k)
+    assert_int_equal(sonde_sequence_set_picture(&s, k, probe, &image, NULL), SONDE_OK);
+  const sonde_image other = {.width = WIDE + 1, .height = HIGH, .pixels = pixel};
+  assert_int_equal(sonde_sequence_set_picture(&s, 0, probe, &other, NULL), SONDE_ARGUMENT);
+  assert_int_equal(sonde_sequence_save(path_of("p.seq.nrrd"), &s, true, NULL), SONDE_OK);
+  assert_int_equal(sonde_sequence_load(path_of("p.seq.nrrd"), &t, NULL), SONDE_OK);
+  assert_int_equal(sonde_sequence_locate(&t, NULL, NULL, &located, NULL), SONDE_OK);
+  assert_int_equal(located.used, 2);
+  assert_string_equal(located.world, "Reference");
+  const sonde_affine plane = sonde_slice_plane(probe, &image);
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 4; ++k)
+      if (k != 2) assert_near(t.frames[1].world_from_pixel.m[i][k], plane.m[i][k], 1e-12);
+  assert_memory_equal(t.pixels + sizeof pixel, pixel, sizeof pixel);
+  sonde_sequence_clear(&s);
+  sonde_sequence_clear(&t);
+}
+
 static void calibration_is_read_or_named(void **state) {
   (void)state;
   static const char good[] = "<A>\n<!-- <Transform From=\"x\"/> -->\n<Transform From='Image' "
@@ -468,6 +498,7 @@ int main(void) {
                                      cmocka_unit_test(no_cut_goes_unnoticed),
                                      cmocka_unit_test(transforms_join_either_way_round),
                                      cmocka_unit_test(invalid_frames_are_kept_and_not_used),
+                                     cmocka_unit_test(a_picture_keeps_its_plane),
                                      cmocka_unit_test(calibration_is_read_or_named),
                                      cmocka_unit_test(volumes_are_read_back),
                                      cmocka_unit_test(every_failed_allocation_is_reported),

@@ -40,13 +40,6 @@ typedef struct sonde_header {
   sonde_affine mm_from_voxel;
 } sonde_header;
 
-// Sets or replaces a field; key and value are copied. @param frame or SONDE_WHOLE_FILE
-sonde_status sonde_sequence_set(sonde_sequence *sequence, uint32_t frame, const char *key,
-                                const char *value, sonde_error *error);
-// Sets "<name>Transform" to 16 numbers in mm and its status to OK. @param a_from_b in mm
-sonde_status sonde_sequence_set_transform(sonde_sequence *sequence, uint32_t frame,
-                                          const char *name, const sonde_affine *a_from_b,
-                                          sonde_error *error);
 // Value of a field or NULL; borrowed.
 const char *sonde_sequence_get(const sonde_sequence *sequence, uint32_t frame, const char *key);
 

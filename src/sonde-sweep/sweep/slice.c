@@ -248,6 +248,30 @@ sonde_affine sonde_slice_plane(sonde_pose probe, const sonde_image *image) {
   return affine_columns(v_scale(x, dx), v_scale(z, dz), v_neg(y), corner);
 }
 
+sonde_status sonde_sequence_set_picture(sonde_sequence *s, uint32_t frame, sonde_pose probe,
+                                        const sonde_image *image, sonde_error *error) {
+  SONDE_ASSERT(s && frame < s->count && image && image->pixels);
+  if (image->width != s->width || image->height != s->height)
+    return sonde_fail(error, SONDE_ARGUMENT, "a picture of %u x %u pixels, expected %u x %u",
+                      image->width, image->height, s->width, s->height);
+  const size_t pixels = (size_t)s->width * s->height;
+  memcpy(s->pixels + frame * pixels, image->pixels, pixels);
+  sonde_affine to_probe = sonde_slice_plane((sonde_pose){{0, 0, 0}, {1, 0, 0, 0}}, image);
+  const sonde_vec3 axis[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  sonde_affine to_reference =
+      affine_columns(q_rotate(probe.rotation, axis[0]), q_rotate(probe.rotation, axis[1]),
+                     q_rotate(probe.rotation, axis[2]), v_scale(probe.position, 1e3));
+  // In mm; across the picture a voxel is as thick as a pixel is wide.
+  const double thick = image->width_m / image->width;
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < 4; ++k)
+      to_probe.m[i][k] = 1e3 * (k == 2 ? thick : 1) * to_probe.m[i][k] + 0.0;
+  sonde_status status = sonde_sequence_set_transform(s, frame, "ImageToProbe", &to_probe, error);
+  if (!status)
+    status = sonde_sequence_set_transform(s, frame, "ProbeToReference", &to_reference, error);
+  return status ? status : sonde_sequence_set(s, frame, "ImageStatus", "OK", error);
+}
+
 const slice_kernels *sonde_slice_kernels_find(const char *name) {
   const slice_kernels *known[] = {
 #ifdef __x86_64__
