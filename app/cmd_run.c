@@ -21,6 +21,7 @@ typedef struct options {
   double seconds, gel_m3;
   bool headless, lockstep, json, no_gel, circulate;
   sonde_posture posture;
+  double valve_leak;
   run_device device;
 } options;
 
@@ -61,6 +62,9 @@ static const app_option TABLE[] = {
     OPT_FLAG(circulate, "circulation",
              "pulse, breath, posture and strain move the vessels' pressures"),
     OPT_WORD(posture, "posture", "NAME", POSTURES, "with --circulation"),
+    OPT_REAL(valve_leak, "valve-leak", "S", 0, 1, 1,
+             "what the veins' valves leave open to blood that falls back, seen by Doppler; default "
+             "0, 1: no valve shuts"),
     OPT_TEXT(
         device.name, "device", "NAME",
         "what moves the probe: page, touch, touch_x, premium_1.5, openhaptics, omega.3, "
@@ -362,6 +366,7 @@ static int run(void *from) {
   sonde_scanner scanner;
   def.circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
   def.controls.posture = s->posture;
+  def.circulation.valve_leak = s->valve_leak;
   run_device_limits(&s->device, &def);
 
   // The built-in probes, and the wanted one when it is a file or a name that will be refused.

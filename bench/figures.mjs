@@ -57,6 +57,9 @@ const json = (bin, ...options) => JSON.parse(run(bin, 'sonde', ...options, '--js
 const engine = ['src/sonde/world', 'src/sonde/tissue', 'src/sonde/sparse']
 const thigh = ['--surface', 'data/thigh/skin.ply', '--sites', 'data/thigh/sites.csv']
 
+// Seed, sex and BMI of the legs whose flow is measured.
+const FLOW_LEGS = [['29', 'female', '19.5'], ['3', 'male', '24'], ['7', 'female', '31'], ['12', 'male', '34']]
+
 // What a group measures: the sources that its figures depend on, and its values by name.
 const GROUPS = {
   fit: {
@@ -220,7 +223,7 @@ const GROUPS = {
     sources: ['src/sonde-limb', 'app/cmd_doppler.c'],
     measure(bin) {
       const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-')), legs = []
-      for (const [seed, sex, bmi] of [['29', 'female', '19.5'], ['3', 'male', '24'], ['7', 'female', '31'], ['12', 'male', '34']]) {
+      for (const [seed, sex, bmi] of FLOW_LEGS) {
         const path = join(folder, 'leg.sonde')
         run(bin, 'sonde', 'limb', '--seed', seed, '--sex', sex, '--bmi', bmi, '--model', path)
         const take = (...options) => json(bin, 'doppler', path, ...options)
@@ -240,6 +243,23 @@ const GROUPS = {
       values.phasicity_off_percent = Math.max(...legs.map(l => 100 * Math.abs(l.rest.phasicity / l.rest.true_phasicity - 1)))
       values.reflux_off_s = Math.max(...legs.flatMap(l => [l.knee, l.leak, l.strain].map(r => Math.abs(r.reflux_s - r.true_reflux_s))))
       return values
+    },
+  },
+  // What a gate in a picture of the same legs reads off its spectrum, and the truth in it.
+  gate: {
+    sources: ['src/sonde-limb', 'bench/bench_gate.c'],
+    measure(bin) {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-'))
+      const paths = FLOW_LEGS.map(([seed, sex, bmi]) => {
+        const path = join(folder, `leg-${seed}.sonde`)
+        run(bin, 'sonde', 'limb', '--seed', seed, '--sex', sex, '--bmi', bmi, '--model', path)
+        return path
+      })
+      run(bin, 'bench_gate', join(folder, 'table.csv'), ...paths)
+      const [head, ...rows] = readFileSync(join(folder, 'table.csv'), 'utf8').trim().split('\n').map(line => line.split(','))
+      rmSync(folder, { recursive: true })
+      const legs = rows.map((row, k) => ({ ...Object.fromEntries(head.map((name, i) => [name, Number(row[i])])), limb: Number(FLOW_LEGS[k][0]) }))
+      return { legs, phasicity_off_percent: Math.max(...legs.map(l => 100 * Math.abs(l.phasicity / l.true_phasicity - 1))) }
     },
   },
   // Forces and cuffs that close the veins of eight limbs at the stations, and what clots leave of them.
@@ -343,6 +363,8 @@ const BLOCKS = {
       ['common femoral artery: peak', from(flow.artery_peak_cm_s, 0, ' cm/s'), '114 +- 25'],
     ])
   },
+  gate: ({ gate }) => table(['seed', 'phasicity in the groin: read off; true', 'popliteal vein, valves leaking: blood falls back, read off; true', 'that is faster along the beam than'],
+    gate.legs.map(l => [l.limb, `${fixed(l.phasicity, 2)}; ${fixed(l.true_phasicity, 2)}`, `${fixed(l.leaking_s, 2)}; ${fixed(l.true_leaking_s, 2)} s`, `${fixed(l.slowest_cm_s, 1)} cm/s`])),
   limb_faults: ({ limb }) => table(['law', `violations in ${limb.limbs} limbs, ${fixed(limb.places, 0)} places`],
     [['walls of two vessels 0.3 mm apart or more', limb.walls], ['deep vessels 1.5 mm or more from bone', limb.bone], ['no lumen in bone', limb.lumen],
       ['deep vessels 0.3 mm or more under the deep fascia', limb.fascia], ['saphenous veins between both fasciae', limb.eye]]),

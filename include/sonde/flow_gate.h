@@ -17,7 +17,7 @@ extern "C" {
 
 /** Columns come so many seconds after each other; so many are kept. */
 #define SONDE_GATE_COLUMN_S 0.01
-enum { SONDE_GATE_COLUMNS = 32 };
+enum { SONDE_GATE_COLUMNS = 64 };
 
 /** What an examiner sets; sonde_gate_clean() says the ranges. */
 typedef struct sonde_gate_settings {

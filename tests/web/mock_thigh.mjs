@@ -83,6 +83,9 @@ const rotate = ([w, x, y, z], v) => {
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const clamp = (v, low, high) => Math.min(high, Math.max(low, v));
 
+/** How long the mock's blood falls back after a squeeze. */
+export const REFLUX_S = 0.8;
+
 export class SyntheticThigh {
   constructor(toAll) {
     this.toAll = toAll;
@@ -92,6 +95,7 @@ export class SyntheticThigh {
       dynamic_range_db: 60, focus_mm: 25, tgc_db_per_cm: 0.5, posture: "supine", valsalva: false, gel: true, gel_ml: 0,
       stiffness_scale: 1, damping_scale: 1, friction_scale: 1,
       colour: "off", colour_box_mm: [-14, 14, 6, 36], colour_steer_deg: 0, colour_scale_cm_s: 6, colour_gain_db: 0,
+      doppler: true, gate: false, gate_mm: [0, 20], gate_length_mm: 3, gate_steer_deg: 0, gate_angle_deg: 60, gate_scale_cm_s: 60, gate_baseline: 0, gate_filter_hz: 50, gate_gain_db: 0,
     };
     this.hand = []; // what the free hand and the patient did
     this.pose = { position_mm: [6, RADIUS(140) + 12, 140], rotation: [0.7071, 0.7071, 0, 0] };
@@ -137,7 +141,10 @@ export class SyntheticThigh {
     else if (m.type === "stop") this.fault = 1;
     else if (m.type === "resume") this.fault = 0;
     else if (m.type === "gel") this.controls.gel_ml = m.action === "put" ? this.controls.gel_ml + 2 : 0;
-    else if (m.type === "hand") this.hand.push(m.action);
+    else if (m.type === "hand") {
+      this.hand.push(m.action);
+      if (m.action === "squeeze") this.squeezed_s = this.time_s;
+    }
     else if (m.type === "controls") for (const key of Object.keys(m)) if (key in this.controls && key !== "type" && key !== "controls") this.controls[key] = m[key];
     this.controls.stop = this.fault !== 0;
     return ["stop", "resume", "gel", "controls"].includes(m.type);
@@ -171,7 +178,8 @@ export class SyntheticThigh {
     const nodes = this.skin.points.length / 3;
     const [w, h] = [WIDTH_MM * PX_PER_MM, Math.round(this.controls.depth_mm * PX_PER_MM)];
     const colour = this.colour(w, h);
-    const b = head(3, ++this.sequence, 140 + 6 * nodes + w * h + colour.length);
+    const spectrum = this.spectrum();
+    const b = head(3, ++this.sequence, 140 + 6 * nodes + w * h + colour.length + spectrum.length);
     b.writeBigUInt64LE(BigInt(Math.round(this.time_s * 1000)), 16);
     b.writeDoubleLE(this.time_s, 24);
     b.writeUInt32LE(nodes, 32);
@@ -186,13 +194,46 @@ export class SyntheticThigh {
     this.dent(b, s);
     this.image(b.subarray(140 + 6 * nodes, 140 + 6 * nodes + w * h), w, h, s);
     colour.copy(b, 140 + 6 * nodes + w * h);
+    spectrum.copy(b, 140 + 6 * nodes + w * h + colour.length);
+    return b;
+  }
+
+  /** 10 cm/s along the beam with the breath; squeezed 40 for a second, then REFLUX_S of -20. */
+  flow(time_s) {
+    const since = time_s - (this.squeezed_s ?? Infinity);
+    if (since >= 0 && since < 1) return 40;
+    if (since >= 1 && since < 1 + REFLUX_S) return -20;
+    return 10 + 4 * Math.sin(2 * Math.PI * 0.25 * time_s);
+  }
+
+  /** The last columns, each as bright between the base line and the edge as it gets. */
+  spectrum() {
+    const c = this.controls;
+    if (!c.gate) return Buffer.alloc(0);
+    const [count, bins, limit] = [64, 128, c.gate_scale_cm_s];
+    const first = Math.max(0, Math.floor(this.time_s * 100) - count);
+    const b = Buffer.alloc(56 + count * (8 + bins), 20);
+    [3, count, bins, 0].forEach((v, i) => b.writeUInt16LE(v, 2 * i));
+    const low = limit * (c.gate_baseline - 1);
+    [...c.gate_mm, c.gate_length_mm, c.gate_steer_deg, c.gate_angle_deg, limit, low, 4000, 0.03, 0.01].forEach((v, i) => b.writeFloatLE(v, 8 + 4 * i));
+    b.writeBigUInt64LE(BigInt(first), 48);
+    for (let k = 0; k < count; ++k) {
+      const at = 56 + k * (8 + bins);
+      const mean = this.flow((first + k) / 100);
+      b.writeFloatLE(mean, at);
+      b.writeFloatLE(1.25 * mean, at + 4);
+      for (let n = 0; n < bins; ++n) {
+        const v = low + ((n + 0.5) * 2 * limit) / bins;
+        if (v * mean > 0 && Math.abs(v) < Math.abs(1.25 * mean)) b[at + 8 + n] = 230;
+      }
+    }
     return b;
   }
 
   /** The box, full of the greatest velocity towards the probe. */
   colour(w, h) {
     const shown = ["off", "velocity", "power"].indexOf(this.controls.colour);
-    if (shown === 0) return Buffer.alloc(0);
+    if (shown <= 0) return Buffer.alloc(0);
     const [left, right, top, bottom] = this.controls.colour_box_mm;
     const place = [left * PX_PER_MM + w / 2, top * PX_PER_MM, (right - left) * PX_PER_MM, Math.min(bottom * PX_PER_MM, h) - top * PX_PER_MM].map(Math.round);
     const b = Buffer.alloc(36 + place[2] * place[3], 255);

@@ -7,6 +7,7 @@ import path from "node:path";
 import { PATIENCE_MS, browserPath, exams, goTo, openBrowser, ready } from "./drive.mjs";
 import { contrastFaults, layoutFaults, nameFaults } from "./inspect.mjs";
 import { startMock } from "./mock_server.mjs";
+import { REFLUX_S } from "./mock_thigh.mjs";
 
 const [, , webDir, outDir] = process.argv;
 const SKIPPED = 77;
@@ -387,6 +388,53 @@ async function testDuplex(page, mock) {
   await page.waitForFunction(() => document.getElementById("duplex-tools").hidden);
 }
 
+/** The gate follows pointer and keys, its settings reach the program, and a frozen spectrum says what flowed. */
+async function testPulsed(page, mock) {
+  mock.thigh.squeezed_s = undefined; // calm blood
+  await page.locator("#scene").focus();
+  await page.keyboard.press("Shift+P");
+  await page.waitForFunction(() => window.sonde.spectrum?.columns > 50);
+  check(await page.evaluate(() => Math.abs(window.sonde.spectrum.mean) > 5 && window.sonde.sounded === 0), "the spectrum scrolls in silence");
+  const grip = page.locator(".pane:not([hidden]) .gate .grip").first();
+  const box = await grip.boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.mouse.down();
+  await page.mouse.move(box.x + box.width / 2 + 40, box.y + box.height / 2 + 30, { steps: 3 });
+  await page.mouse.up();
+  await page.waitForFunction(() => window.sonde.controls.gate_mm[0] > 1 && window.sonde.controls.gate_mm[1] > 21);
+  const [, depth] = mock.thigh.controls.gate_mm;
+  await grip.focus();
+  await page.keyboard.press("ArrowUp");
+  await page.waitForFunction((d) => Math.abs(window.sonde.controls.gate_mm[1] - d + 0.5) < 0.01, depth);
+  await page.locator("#gate-beam-more").click();
+  await page.locator("#gate-filter-less").click();
+  await page.waitForFunction(() => window.sonde.controls.gate_filter_hz === 20);
+  check(mock.thigh.controls.gate_steer_deg === 20, "the gate's settings reach the program");
+  await page.locator("#doppler-sound").click();
+  await page.waitForFunction(() => window.sonde.sounded > 10);
+  await page.waitForFunction(() => window.sonde.spectrum.columns > 150);
+  await page.locator("#squeeze").click();
+  await page.waitForFunction(() => window.sonde.spectrum.squeezes === 1);
+  const squeezed = mock.thigh.squeezed_s;
+  await page.waitForFunction((t) => window.sonde.snapshot.time_s > t + 2.6, squeezed);
+  await page.keyboard.press("f");
+  await page.waitForFunction(() => document.querySelector("#spectrum-words").textContent.includes("Reverse"));
+  const read = await page.evaluate(() => window.sonde.spectrum);
+  check(Math.abs(read.reflux_s / REFLUX_S - 1) < 0.05, `the frozen spectrum has the time of reflux: ${read.reflux_s} s`);
+  check(Math.abs(read.peak / 100 - 1) < 0.05 && read.squeezes === 1, `and the peak along the cursor: ${read.peak} cm/s`);
+  check(Math.abs(read.augmentation / 4 - 1) < 0.4, `the squeeze augments: ${read.augmentation}`);
+  await inspect(page, "pulsed");
+  await page.screenshot({ path: path.join(outDir, "pulsed.png") });
+  await page.locator("#scene").focus();
+  await page.keyboard.press("f");
+  await page.keyboard.press("Shift+P");
+  await page.waitForFunction(() => document.getElementById("spectrum").hidden);
+  // A curved face has none, and the page says so.
+  Object.assign(mock.thigh.controls, { doppler: false, gate: undefined, colour: undefined });
+  await page.locator("#gel-put").click();
+  await page.waitForFunction(() => document.getElementById("no-doppler").checkVisibility() && document.getElementById("pulsed").hidden);
+}
+
 /** Two fingers that go up press. */
 async function testTouch(page) {
   const before = await page.evaluate(() => window.sonde.depth);
@@ -445,6 +493,7 @@ async function main() {
     await testCompare(page);
     await testPatient(page, mock);
     await testDuplex(page, mock);
+    await testPulsed(page, mock);
     await testTouch(page);
     check(errors.length === 0, `no errors on the console${errors.map((e) => `\n       ${e}`).join("")}`);
   } finally {

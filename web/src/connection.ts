@@ -6,6 +6,7 @@ import {
   type ColourWish,
   type Decision,
   type Frame,
+  type GateWish,
   type Guidance,
   type Line,
   type Mesh,
@@ -74,6 +75,9 @@ export class Connection {
     this.send({ type: "gel", action });
   }
   colour(wish: ColourWish): void {
+    this.send({ type: "controls", ...wish });
+  }
+  gate(wish: GateWish): void {
     this.send({ type: "controls", ...wish });
   }
   hand(action: "squeeze" | "breathe"): void {

@@ -32,6 +32,19 @@ export function button(text: string, action: () => void, className = ""): HTMLBu
   return element;
 }
 
+/** A name with a value between less and more; its buttons' ids are `id`-less and `id`-more. */
+export function stepper(id: string, name: string, output: HTMLElement, change: (way: number) => void, title: string): HTMLElement {
+  const row = make("span", "stepper");
+  const step = (text: string, way: number): HTMLElement => {
+    const one = button(text, () => change(way));
+    Object.assign(one, { title, id: `${id}-${way < 0 ? "less" : "more"}` });
+    one.setAttribute("aria-label", `${name} ${way < 0 ? "less" : "more"}`);
+    return one;
+  };
+  row.append(make("span", "caption", name), step("−", -1), output, step("+", 1));
+  return row;
+}
+
 let byPointer = false;
 window.addEventListener("pointerdown", () => (byPointer = true), true);
 window.addEventListener("keydown", () => (byPointer = false), true);

@@ -1,7 +1,7 @@
 // Doppler over the image: the colours, the box with its bar, and the buttons of scanner and free hand.
 
 import type { Connection } from "./connection";
-import { announce, button, draw, find, make, press, pressed } from "./dom";
+import { announce, draw, find, make, press, pressed, stepper } from "./dom";
 import type { ColourFrame, ColourShown, Controls } from "./protocol";
 
 const SCALES_CM_S = [1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 40, 60, 100];
@@ -168,6 +168,8 @@ export class DopplerBox {
 
 /** The buttons and keys of colour and hand. */
 export class Duplex {
+  /** the hand squeezes the calf */
+  squeezed: () => void = () => undefined;
   private controls: Controls | null = null;
   private sent = 0;
   private readonly values = { scale: make("output"), gain: make("output"), steer: make("output") };
@@ -180,10 +182,10 @@ export class Duplex {
     press("power", () => this.power());
     press("squeeze", () => this.hand("squeeze"));
     press("breathe", () => this.hand("breathe"));
-    find("duplex-tools").append(
-      this.stepper("Scale", this.values.scale, (way) => this.scale(way), "; and ': velocity from which colour folds"),
-      this.stepper("Gain", this.values.gain, (way) => this.gain(way), "− and =: how little is shown"),
-      this.stepper("Steer", this.values.steer, (way) => this.steer(way), "\\: lean of the beam"),
+    find("colour-tools").append(
+      stepper("scale", "Scale", this.values.scale, (way) => this.scale(way), "; and ': velocity from which colour folds"),
+      stepper("gain", "Gain", this.values.gain, (way) => this.gain(way), "− and =: how little is shown"),
+      stepper("steer", "Steer", this.values.steer, (way) => this.steer(way), "\\: lean of the beam"),
     );
     box.moved = (mm, last) => {
       const now = performance.now(); // a hand that drags need not send more often than pictures come
@@ -193,24 +195,13 @@ export class Duplex {
     };
   }
 
-  private stepper(name: string, output: HTMLElement, change: (way: number) => void, title: string): HTMLElement {
-    const row = make("span", "stepper");
-    const step = (text: string, way: number): HTMLElement => {
-      const one = button(text, () => change(way));
-      Object.assign(one, { title, id: `${name.toLowerCase()}-${way < 0 ? "less" : "more"}` });
-      one.setAttribute("aria-label", `${name} ${way < 0 ? "less" : "more"}`);
-      return one;
-    };
-    row.append(make("span", "caption", name), step("−", -1), output, step("+", 1));
-    return row;
-  }
-
   set(controls: Controls): void {
     this.controls = controls;
     const shown = this.shown;
     this.box.enabled = controls.controls;
     find("colour").hidden = controls.colour === undefined;
-    find("duplex-tools").hidden = shown === "off";
+    find("duplex-tools").hidden = shown === "off" && !controls.gate;
+    find("colour-tools").hidden = shown === "off";
     pressed("colour", shown !== "off");
     pressed("power", shown === "power");
     for (const each of document.querySelectorAll<HTMLButtonElement>("#colour, #duplex-tools button")) each.disabled = !controls.controls;
@@ -260,6 +251,7 @@ export class Duplex {
 
   private hand(action: "squeeze" | "breathe"): void {
     this.connection.hand(action);
+    if (action === "squeeze") this.squeezed();
     pressed(action, true);
     window.setTimeout(() => pressed(action, false), action === "squeeze" ? SQUEEZE_MS : BREATH_MS);
     announce(action === "squeeze" ? "The calf is squeezed." : "The patient breathes in deeply.");

@@ -4,6 +4,7 @@
 import { Calipers, type Tool } from "./calipers";
 import { label, make } from "./dom";
 import { DopplerBox, paintColour } from "./duplex";
+import { GateOverlay } from "./gate";
 import type { Controls, Frame } from "./protocol";
 
 const RULER_PX = 40;
@@ -28,6 +29,7 @@ class Pane {
   readonly title = make("span", "pane-title");
   readonly calipers: Calipers;
   readonly doppler = new DopplerBox();
+  readonly gate = new GateOverlay();
   width_mm = 60;
   height_mm = 70;
   private readonly image: CanvasRenderingContext2D;
@@ -38,7 +40,7 @@ class Pane {
     this.image = context(this.canvas);
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", name);
-    this.root.append(this.canvas, this.doppler.svg, this.calipers.svg, this.title);
+    this.root.append(this.canvas, this.doppler.svg, this.gate.svg, this.calipers.svg, this.title);
   }
 
   /** True when the size in millimetres changed. */
@@ -53,6 +55,7 @@ class Pane {
     for (let i = 0; i < grey.length; ++i) rgba[i] = 0xff000000 | (grey[i]! * 0x010101);
     if (frame.colour) paintColour(rgba, frame.width, frame.colour);
     this.doppler.show(frame.colour);
+    this.gate.show(frame.spectrum);
     this.image.putImageData(this.data, 0, 0);
     const same = frame.width_mm === this.width_mm && frame.height_mm === this.height_mm;
     this.width_mm = frame.width_mm;
@@ -74,6 +77,7 @@ class Pane {
     Object.assign(this.root.style, style);
     this.calipers.layout(this.width_mm, this.height_mm, scale);
     this.doppler.layout(this.width_mm, this.height_mm, scale);
+    this.gate.layout(this.width_mm, this.height_mm, scale);
   }
 }
 
@@ -106,6 +110,9 @@ export class EchoView {
   /** of the live image */
   get doppler(): DopplerBox {
     return this.live.doppler;
+  }
+  get gate(): GateOverlay {
+    return this.live.gate;
   }
   get isFrozen(): boolean {
     return this.frozen;

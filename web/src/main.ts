@@ -9,6 +9,7 @@ import { Duplex } from "./duplex";
 import { EchoView } from "./echo";
 import { ExamBar } from "./exam";
 import { ForceBar } from "./force_bar";
+import { GateTools } from "./gate";
 import { HistoryDialog } from "./history";
 import { Input } from "./input";
 import { limbWords } from "./limb";
@@ -22,6 +23,8 @@ import { ReplayBar } from "./replay";
 import { ResultDialog } from "./result";
 import { Route } from "./route";
 import { LegScene } from "./scene";
+import { DopplerSound } from "./sound";
+import { SpectrumView } from "./spectrum";
 import { StartDialog } from "./start";
 import { EchoTools } from "./tools";
 import { Traces } from "./traces";
@@ -65,6 +68,9 @@ class App {
   private readonly tools = new EchoTools(this.echo);
   private readonly patient: PatientTools;
   private readonly duplex: Duplex;
+  readonly sound = new DopplerSound();
+  readonly spectrum = new SpectrumView(this.sound);
+  private readonly gateTools: GateTools;
   private readonly examBar: ExamBar;
   readonly worksheet: Worksheet;
   private readonly replayBar: ReplayBar;
@@ -94,6 +100,9 @@ class App {
     }));
     this.patient = new PatientTools(connection);
     this.duplex = new Duplex(connection, this.echo.doppler);
+    this.duplex.squeezed = () => this.spectrum.squeezed();
+    this.gateTools = new GateTools(connection, this.echo.gate, this.sound);
+    this.spectrum.keep = (reflux_s) => this.worksheet.keepReflux(reflux_s);
     this.examBar = new ExamBar({
       decide: (segment, decision) => connection.decide(segment, decision),
       write: (segment, decision) => this.worksheet.write(segment, decision),
@@ -183,7 +192,7 @@ class App {
     else if (code === "Digit0" && this.hands) this.setDepth(EASED_MM);
     else if (this.phase === "replay" && this.controls?.controls && this.replayBar.key(code, shift)) return true;
     else if (this.worksheet.key(code, shift)) return true;
-    else return this.duplex.key(code, shift) || this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
+    else return this.gateTools.key(code, shift) || this.duplex.key(code, shift) || this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
     return true;
   }
 
@@ -232,6 +241,8 @@ class App {
     this.echo.set(controls);
     this.patient.set(controls);
     this.duplex.set(controls);
+    this.gateTools.set(controls);
+    this.spectrum.set(controls);
     this.scene.setGel((controls.gel_ml ?? 0) > 0.05);
     if (probeChanged) this.plot.clear();
     this.curveKey = "";
@@ -567,6 +578,7 @@ class App {
     this.pixels = frame.pixels;
     this.scene.show(frame);
     this.echo.show(frame);
+    this.spectrum.show(frame.spectrum, this.echo.isFrozen);
     this.worksheet.see(s.tick, this.echo.isFrozen);
     this.readouts.show(s);
     const running = this.phase === "running";
@@ -633,6 +645,10 @@ const sonde = {
   /** changes whenever the echo image changes */
   get imageSum() { return app.pixels.reduce((sum, p, i) => (sum + p * ((i % 251) + 1)) % 1e9, 0); },
   get measures() { return app.echo.measures; },
+  /** what is read off the spectrum */
+  get spectrum() { return app.spectrum.readings; },
+  /** columns of the spectrum that were made audible */
+  get sounded() { return app.sound.sounded; },
   get depth() { return app.hold.depth_mm; },
   /** where the hand holds the probe on the resting skin */
   get point() { return app.hold.point; },

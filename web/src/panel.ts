@@ -167,6 +167,7 @@ const KEYS: [string, string][] = [
   ["1 to 9, C", "choose the probe, next vein (free practice)"],
   ["F, M, O, B", "freeze; measure a distance, an area (Delete clears); compare with now"],
   ["P, V, Z", "patient's position, strain, gel (Shift + Z wipes)"],
+  ["Shift + P", "pulsed Doppler: gate and spectrum; its gate and cursor by arrow keys when focused"],
   ["Shift + B, Shift + M", "colour, power; ; and ' their scale, - and = their gain, \\ the beam's lean"],
   ["Shift + C, Shift + V", "squeeze the calf, deep breath"],
   [", and .", "segment before, next segment"],

@@ -110,8 +110,24 @@ export interface Controls {
   colour_steer_deg?: number;
   colour_scale_cm_s?: number;
   colour_gain_db?: number;
+  /** a curved face has no Doppler */
+  doppler?: boolean;
+  gate?: boolean;
+  /** x from the middle of the face, depth */
+  gate_mm?: [number, number];
+  gate_length_mm?: number;
+  gate_steer_deg?: number;
+  /** from the beam to the cursor that lies along the vessel */
+  gate_angle_deg?: number;
+  gate_scale_cm_s?: number;
+  /** how far the base line is moved down, share of half the axis */
+  gate_baseline?: number;
+  gate_filter_hz?: number;
+  gate_gain_db?: number;
 }
 
+export type GateKey = "gate_length_mm" | "gate_steer_deg" | "gate_angle_deg" | "gate_scale_cm_s" | "gate_baseline" | "gate_filter_hz" | "gate_gain_db";
+export type GateWish = Partial<Pick<Controls, "gate" | "gate_mm" | GateKey>>;
 export type ColourShown = "off" | "velocity" | "power";
 export type ColourWish = Partial<Pick<Controls, "colour" | "colour_box_mm" | "colour_steer_deg" | "colour_scale_cm_s" | "colour_gain_db">>;
 export type Role = "learner" | "watcher" | "teacher";
@@ -312,6 +328,34 @@ export interface Frame {
   pixels: Uint8Array;
   /** null: Doppler is off */
   colour: ColourFrame | null;
+  /** null: pulsed Doppler is off */
+  spectrum: SpectrumFrame | null;
+}
+
+/** The spectrum at one time; velocities along the beam, towards the probe. */
+export interface SpectrumColumn {
+  /** times column_s: when its last pulse was sent */
+  number: number;
+  /** 0: noise alone */
+  mean_cm_s: number;
+  edge_cm_s: number;
+  /** from the lowest velocity up; 0 to 255 are 36 dB */
+  power: Uint8Array;
+}
+
+export interface SpectrumFrame {
+  x_mm: number;
+  z_mm: number;
+  length_mm: number;
+  steer_deg: number;
+  angle_deg: number;
+  /** half the width of the velocities that are shown, and the lowest of them */
+  limit_cm_s: number;
+  low_cm_s: number;
+  pulse_hz: number;
+  window_s: number;
+  column_s: number;
+  columns: SpectrumColumn[];
 }
 
 /** Colour over a rectangle of a frame's image. */
@@ -338,6 +382,8 @@ const HEADER = 16;
 const MESH_FIXED = 24;
 const FRAME_FIXED = 140;
 const COLOUR_FIXED = 36;
+const SPECTRUM_FIXED = 56;
+const SPECTRUM = 3; // what its block begins with, where colours have 1 or 2
 const MAGIC = 0x45444e53; // "SNDE", little-endian
 
 /** Reads one value after the other. */
@@ -374,8 +420,35 @@ class Cursor {
   }
 }
 
+function decodeSpectrum(bytes: ArrayBuffer, at: number): SpectrumFrame | null {
+  if (at + SPECTRUM_FIXED > bytes.byteLength) return null;
+  const c = new Cursor(new DataView(bytes), at + 2);
+  const [count, bins] = [c.u16(), c.u16()];
+  c.u16();
+  const frame: SpectrumFrame = {
+    x_mm: c.f32(),
+    z_mm: c.f32(),
+    length_mm: c.f32(),
+    steer_deg: c.f32(),
+    angle_deg: c.f32(),
+    limit_cm_s: c.f32(),
+    low_cm_s: c.f32(),
+    pulse_hz: c.f32(),
+    window_s: c.f32(),
+    column_s: c.f32(),
+    columns: [],
+  };
+  const first = c.u64();
+  for (let k = 0; k < count; ++k) {
+    const from = at + SPECTRUM_FIXED + k * (8 + bins);
+    const head = new Cursor(new DataView(bytes), from);
+    frame.columns.push({ number: first + k, mean_cm_s: head.f32(), edge_cm_s: head.f32(), power: new Uint8Array(bytes, from + 8, bins) });
+  }
+  return frame;
+}
+
 function decodeColour(bytes: ArrayBuffer, at: number): ColourFrame | null {
-  if (at + COLOUR_FIXED > bytes.byteLength) return null;
+  if (at + COLOUR_FIXED > bytes.byteLength || new DataView(bytes).getUint16(at, true) === SPECTRUM) return null;
   const c = new Cursor(new DataView(bytes), at);
   const shown = c.u16() === 2 ? "power" : "velocity";
   const [left, top, width, height] = [c.u16(), c.u16(), c.u16(), c.u16()];
@@ -422,6 +495,8 @@ function decodeFrame(bytes: ArrayBuffer, sequence: number): Frame {
   const width_mm = c.f32();
   const height_mm = c.f32();
   const quantum_mm = c.f32();
+  const behind = FRAME_FIXED + nodes * 6 + width * height;
+  const colour = decodeColour(bytes, behind);
   return {
     kind: "frame",
     sequence,
@@ -433,7 +508,8 @@ function decodeFrame(bytes: ArrayBuffer, sequence: number): Frame {
     width_mm,
     height_mm,
     pixels: new Uint8Array(bytes, FRAME_FIXED + nodes * 6, width * height),
-    colour: decodeColour(bytes, FRAME_FIXED + nodes * 6 + width * height),
+    colour,
+    spectrum: decodeSpectrum(bytes, behind + (colour ? COLOUR_FIXED + colour.pixels.length : 0)),
   };
 }
 

@@ -200,6 +200,14 @@ export class Worksheet {
     this.actions.enter({ place: this.at, picture: this.shownTick, marks: this.actions.marks() });
   }
 
+  /** Time of reflux that was measured at the station. */
+  keepReflux(reflux_s: number): void {
+    if (!this.controls || !this.sheet) return;
+    const least_s = 0.5; // at a calf vein or a superficial one; the learner may say otherwise
+    this.actions.enter({ place: this.at, reflux: reflux_s > least_s ? "present" : "absent", reflux_s: Math.min(reflux_s, 20) });
+    announce(`Kept in the worksheet: reflux of ${reflux_s.toFixed(2)} seconds`);
+  }
+
   /** Fetches the pixels of pictures that are not here yet. */
   private async load(): Promise<void> {
     const sheet = this.sheet;

@@ -5,9 +5,10 @@
 
 #include "sonde/exam.h"
 
-// Sides of a box are at least this long; an image keeps this share of the colours before it, which
-// is set by eye for 50 images a second.
-static const double sonde_duplex_least_m = 4e-3, sonde_duplex_persistence = 0.7;
+// Sides of a box are at least this long; an image keeps this share of the colours so long before
+// it, which is set by eye.
+static const double sonde_duplex_least_m = 4e-3, sonde_duplex_persistence = 0.7,
+                    sonde_duplex_image_s = 0.02;
 enum { SONDE_DUPLEX_GRID = 9 }; // places each way where the tissue's motion is looked at
 
 // What hand and patient did last, s of the session; -INFINITY: never.

@@ -106,7 +106,11 @@ void sonde_duplex_draw(sonde_duplex *d, const sonde_duplex_moment *now, const so
   box.bottom_m = clamp(box.bottom_m, box.top_m + least_m, image->height_m);
   sonde_colour_def def = sonde_colour_def_default();
   const double sound_m_s = 1540, most_hz = sound_m_s / (2 * box.bottom_m);
-  def.frequency_hz = fmin(frequency_hz, highest_hz), def.persistence = sonde_duplex_persistence;
+  def.frequency_hz = fmin(frequency_hz, highest_hz), def.persistence = 0;
+  // Of the time that passed, so that a slow machine's colours do not stay longer.
+  if (d->seen && now->time_s > d->seen_s)
+    def.persistence =
+        fmin(pow(sonde_duplex_persistence, (now->time_s - d->seen_s) / sonde_duplex_image_s), 0.95);
   def.pulse_hz =
       clamp(def.pulse_hz * c->scale_m_s / sonde_colour_limit(&def), 100, fmin(most_hz, 2e4));
   if (!sonde_colour_tune(d->colour, &def)) return;

@@ -161,7 +161,7 @@ static void add_column(sonde_gate *g) {
     velocity[row] = axes.low_m_s + (row + 0.5) * 2 * axes.limit_m_s / BINS;
     // Noise alone has its power here, whatever the window.
     const double db = 10 * log10(fmax(turned[row] / (0.375 * count), 1e-12));
-    const double darkest_db = -16, range_db = 36;
+    const double darkest_db = -12, range_db = 36;
     column->power[row] =
         (uint8_t)lrint(255 * clamp((db + g->settings.gain_db - darkest_db) / range_db, 0, 1));
   }
