@@ -136,6 +136,11 @@ static void what_is_no_part_of_a_thigh_is_refused(void **state) {
   const sonde_limb_part low = {subject, 0.3};
   assert_int_equal(sonde_limb_part_body(&low, 3, &known, &fit, &error), SONDE_ARGUMENT);
   assert_non_null(strstr(error.message, "expected -0.05 to 1.05"));
+  double origin[1] = {0}; // as a limb's model has it
+  subject->map_origin = origin;
+  assert_int_equal(sonde_limb_part_body(&part, 3, &known, &fit, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "expected a thigh of two layers"));
+  subject->map_origin = NULL;
   const double exponent = subject->law.normal_exponent;
   subject->law.normal_exponent = 1;
   assert_int_equal(sonde_limb_part_body(&part, 3, &known, &fit, &error), SONDE_ARGUMENT);

@@ -56,7 +56,7 @@ static sonde_status measure(const sonde_limb_part *part, limb_measured *m, sonde
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
     low = least_of(low, v[i].z), high = most_of(high, v[i].z);
   *m = (limb_measured){.model = model, .from_m = part->from_m};
-  if (model->map || model->kind != SONDE_TWO_LAYER || model->law.normal_exponent != 2)
+  if (model->map_origin || model->kind != SONDE_TWO_LAYER || model->law.normal_exponent != 2)
     return sonde_fail(error, SONDE_ARGUMENT,
                       "%s: expected a thigh of two layers with springs of exponent 2, as `sonde "
                       "fit` makes them",
