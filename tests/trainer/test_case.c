@@ -232,6 +232,7 @@ static void same_case(const sonde_case *a, const sonde_case *b) {
   assert_string_equal(a->extent.to.segment, b->extent.to.segment);
   assert_true(a->circulation.posture == b->circulation.posture);
   assert_near(a->circulation.breath_pa, b->circulation.breath_pa, 1e-9);
+  assert_near(a->circulation.valve_leak, b->circulation.valve_leak, 1e-9);
   assert_true(a->webs == b->webs && a->oedema == b->oedema);
   assert_true(a->thrombosis == b->thrombosis && a->truth_count == b->truth_count);
   assert_memory_equal(a->truth, b->truth, a->truth_count * sizeof a->truth[0]);
@@ -268,7 +269,7 @@ static void a_branch_has_its_own_truth(void **state) {
     snprintf(finding, sizeof finding, FINDING, TRY[i].branch, TRY[i].thrombosis, TRY[i].named);
     snprintf(text, sizeof text,
              "sonde_case: 3\nid: b\ntitle: B\nlevel: hard\nhistory: h\nleg: {seed: 3, sex: male, "
-             "bmi: 24}\n%s",
+             "bmi: 24}\ncirculation: {valve_leak: 0.5}\n%s",
              finding);
     sonde_case c, back;
     sonde_case_setup setup = {0};

@@ -116,4 +116,6 @@ void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out)
   snprintf(out->history, sizeof out->history, "%s, %u years, with %s. %s",
            out->leg.sex == SONDE_SEX_FEMALE ? "Woman" : "Man", age, what,
            MORE[below(&d, SONDE_COUNT_OF(MORE))]);
+  // An old clot leaves valves that do not shut.
+  if (out->webs > 0) out->circulation.valve_leak = rounded(uniform(&d, 0.3, 1), 100);
 }
