@@ -11,7 +11,7 @@ static const double RAD_PER_DEGREE = 3.14159265358979323846 / 180;
 enum { DEPTHS_MOST = 64, POINTS_MOST = 64 };
 
 typedef struct options {
-  const char *model, *probe, *csv, *moduli;
+  const char *model, *probe, *csv, *moduli, *deck;
   long site;
   double block[3]; // m below, NaN: a model
   double depth_m[DEPTHS_MOST];
@@ -106,6 +106,8 @@ static const app_option TABLE[] = {
     OPT_CALL(read_point, "point", "X,Y,Z",
              "also tell the displacement of this point at rest (mm); up to 64 times"),
     OPT_OUTPUT(csv, "csv", "CSV", "write one row per depth, and one per point and depth"),
+    OPT_OUTPUT(deck, "deck", "INP",
+               "write the last depth of a bonded press as a deck of CalculiX, for comparison"),
     OPT_JSON(json),
     OPT_GROUP("Materials"),
     OPT_TEXT(moduli, "moduli", "FILE", "table of all materials that sonde fit --solid has written"),
@@ -299,6 +301,7 @@ static int run(void *from) {
   sonde_status status = open_solid(&w, o, &error);
   if (!status) status = solve_depths(&w, o, &error);
   app_progress_end();
+  if (!status && o->deck) status = sonde_equilibrium_export(w.equilibrium, o->deck, &error);
   // What was solved before a failure is told too.
   if (w.done > 0) {
     if (o->csv && write_csv(&w, o, status ? &other : &error) && !status) status = error.status;

@@ -93,6 +93,7 @@ static sonde_status ask_springs(const fit_solid_job *job, const sonde_model *mod
   const sonde_measurements *m = job->measurements, *also = job->also;
   const sonde_progress progress = app_progress();
   sonde_fit_def def = sonde_fit_def_default();
+  def.stages = 3;
   sonde_fit_result result = {0};
   double *left_out_n = calloc(m->count + also->count, sizeof *left_out_n);
   if (!left_out_n) return SONDE_MEMORY;

@@ -74,6 +74,49 @@ const GROUPS = {
       return values
     },
   },
+  // Moduli of the solid from four sites, beside the springs from all; and with a fat thickness that is wrong by up to 1.5 mm, in waves over the thigh.
+  solid: {
+    sources: ['src/sonde-solid', 'src/sonde-fit/fit/solid.c', 'data/thigh'],
+    measure(bin) {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-')), wrong = join(folder, 'muscle.ply')
+      const [head, body] = readFileSync(join(HOME, 'data/thigh/muscle_surface.ply'), 'utf8').split('end_header\n')
+      const count = Number(/element vertex (\d+)/.exec(head)[1]), lines = body.split('\n')
+      const corners = lines.slice(0, count).map(line => line.split(' ').map(Number))
+      const middle = k => corners.reduce((sum, p) => sum + p[k], 0) / count, cx = middle(0), cy = middle(1)
+      const moved = corners.map(([x, y, z]) => {
+        const r = Math.hypot(x - cx, y - cy), grow = 1 + 1.5 * Math.sin(2 * Math.atan2(y - cy, x - cx) + z / 30) / Math.max(r, 1)
+        return [cx + grow * (x - cx), cy + grow * (y - cy), z].map(c => c.toFixed(6)).join(' ')
+      })
+      writeFileSync(wrong, `${head}end_header\n${[...moved, ...lines.slice(count)].join('\n')}`)
+      const fit = (...options) => {
+        const r = json(bin, 'fit', 'data/thigh/indentation.csv', ...thigh, '--solid', '--at', '0,21,36,49', '--check', '4,17,32,53',
+          '--also', 'data/thigh/indentation_square.csv', '-o', join(folder, 'moduli.csv'), ...options)
+        const errors = e => ({ ln_rms_percent: 100 * e.ln_rms, count: e.all.count, all_percent: e.all.mae_percent,
+          ...Object.fromEntries(Object.entries(e.probes).map(([name, p]) => [`${name}_percent`, p.mae_percent])) })
+        const parts = Object.fromEntries(['fitted', 'left_out', 'never_fitted'].map(key =>
+          [key, { ...errors(r[key]), ...(r[key].springs ? { springs: errors(r[key].springs) } : {}) }]))
+        return { ...parts, moduli: r.moduli, steps: r.steps, processor_s: r.processor_s, start_ln_rms_percent: 100 * r.start_ln_rms }
+      }
+      const values = { right: fit('--beside'), thick: fit('--muscle', wrong, '--edge-mm', '10', '--growth', '2.2') }
+      rmSync(folder, { recursive: true })
+      return values
+    },
+  },
+  // Forces of site 27 on three meshes.
+  solid_mesh: {
+    sources: ['src/sonde-solid', 'data/thigh'],
+    measure(bin) {
+      const meshes = { coarse: ['--edge-mm', '10', '--growth', '2.2', '--through', '3:2:1'], default: [], fine: ['--edge-mm', '3.4', '--growth', '1.7', '--through', '5:3:1'] }
+      const values = {}
+      for (const [name, options] of Object.entries(meshes))
+        for (const contact of ['bonded', 'slip']) {
+          const r = json(bin, 'solve', '--site', '27', '--contact', contact, '--depths', '2,6,10,14,20', ...(contact === 'slip' ? ['--rounding-mm', '3'] : []), ...options)
+          values[`${name}_${contact}`] = { unknowns: r.unknowns, force_n: Object.fromEntries(r.depths.map(d => [`at_${Math.round(d.depth_mm)}`, d.force_n])),
+            steps: r.depths.reduce((sum, d) => sum + d.steps, 0) }
+        }
+      return values
+    },
+  },
   closure: {
     sources: ['src/sonde/interior', 'src/sonde-fit/fit', ...engine, 'data/thigh'],
     measure(bin) {
@@ -324,6 +367,27 @@ const BLOCKS = {
     return table(['', 'parameters', 'linear MAE / SD', 'point MAE / SD', 'both MAE / SD'],
       rows.map(([name, parameters, e]) => [name, parameters, cell(e.probes.linear), cell(e.probes.point), cell(e.all)]))
   },
+  solid_fit({ solid }) {
+    const row = (name, e) => e ? [name, ...['linear', 'point', 'square', 'all'].map(key => e[`${key}_percent`] === undefined ? '' : `${fixed(e[`${key}_percent`], 2)} %`), `${fixed(e.ln_rms_percent, 2)} %`] : null
+    const { right, thick } = solid
+    return table(['', 'linear', 'point', 'square', 'all', 'rms of ln'], [
+      row('solid, 6 numbers, the 4 sites that were fitted', right.fitted), row('solid, sites 4, 17, 32, 53, left out', right.left_out),
+      row('springs, 258 numbers from all other sites, the same rows', right.left_out.springs), row('solid, square footprint, never fitted', right.never_fitted),
+      row('springs, the same rows', right.never_fitted.springs), row('solid, fat wrong by up to 1.5 mm: fitted', thick.fitted), row('the same, sites left out', thick.left_out),
+      row('the same, square footprint', thick.never_fitted)].filter(r => r))
+  },
+  solid_moduli: ({ solid }) => table(['layer', 'true mu, kPa; exponent', 'mu, kPa (sd of ln)', 'exponent (sd of ln)', 'with wrong fat'],
+    [['muscle', '3.6; 9'], ['fat', '1.1; 8'], ['skin', '40; 9']].map(([layer, truth]) => {
+      const m = solid.right.moduli[layer], w = solid.thick.moduli[layer], from = known => known ? '' : ', prior'
+      return [layer, truth, `${fixed(m.shear_kpa, 2)} (${fixed(m.ln_shear_sd, 2)}${from(m.shear_measured)})`,
+        `${fixed(m.exponent, 1)} (${fixed(m.ln_exponent_sd, 2)}${from(m.exponent_measured)})`, `${fixed(w.shear_kpa, 2)}; ${fixed(w.exponent, 1)}`]
+    })),
+  solid_mesh: ({ solid_mesh: m }) => table(['contact', 'mesh', 'unknowns', ...['2', '6', '10', '14', '20'].map(d => `${d} mm, N`)],
+    ['bonded', 'slip'].flatMap(contact => ['coarse', 'default', 'fine'].map(name => {
+      const e = m[`${name}_${contact}`], fine = m[`fine_${contact}`]
+      const cell = key => fixed(e.force_n[key], 3) + (name === 'fine' ? '' : ` (${e.force_n[key] > fine.force_n[key] ? '+' : ''}${fixed(100 * (e.force_n[key] / fine.force_n[key] - 1), 1)} %)`)
+      return [contact === 'slip' ? 'sliding, rounded by 3 mm' : 'bonded', name, fixed(e.unknowns, 0), ...['at_2', 'at_6', 'at_10', 'at_14', 'at_20'].map(cell)]
+    }))),
   ellipsoid: ({ ellipsoid }) => table(['nodes', 'steps/s', 'error', 'nodes awake', 'iterations per step'],
     Object.entries(ellipsoid).map(([name, e]) =>
       [fixed(Number(name.slice(6)), 0), fixed(e.steps_per_s, 0), `${fixed(e.error_percent, 2)} %`, fixed(e.awake, 0), fixed(e.iterations, 1)])),

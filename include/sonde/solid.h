@@ -186,6 +186,11 @@ typedef struct sonde_force_change {
  */
 SONDE_API sonde_status sonde_equilibrium_change(sonde_equilibrium *equilibrium, sonde_vec3 way,
                                                 sonde_force_change *change, sonde_error *error);
+/** Writes a bonded state's mesh, laws and imposed displacements as a deck of CalculiX 2.20 (mm, N,
+ * MPa), which prints the force that holds the footprint. @return ARGUMENT for a sliding probe or
+ * Fung's law; IO @thread owner */
+SONDE_API sonde_status sonde_equilibrium_export(const sonde_equilibrium *equilibrium,
+                                                const char *path, sonde_error *error);
 /** Unknowns of the whole solid and of the skin that may touch. @thread any */
 SONDE_API void sonde_equilibrium_size(const sonde_equilibrium *equilibrium, uint32_t *unknowns,
                                       uint32_t *zone_unknowns);

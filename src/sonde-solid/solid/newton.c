@@ -122,8 +122,11 @@ static sonde_touch touch_zone(const sonde_equilibrium *e, sonde_pose pose, const
       continue;
     for (size_t i = 0; i < 12; ++i) {
       const size_t row = at[i / 3] + i % 3;
+      const uint8_t *held = e->mesh->held;
+      if (held[node[i / 3]] >> i % 3 & 1) continue;
       f[row] += force[i];
-      for (size_t j = 0; j < 12 && matrix; ++j) matrix[row * side + at[j / 3] + j % 3] += k[i][j];
+      for (size_t j = 0; j < 12 && matrix; ++j)
+        if (!(held[node[j / 3]] >> j % 3 & 1)) matrix[row * side + at[j / 3] + j % 3] += k[i][j];
     }
   }
   return sum;
