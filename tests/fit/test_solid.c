@@ -163,6 +163,11 @@ static void bad_input_is_refused(void **state) {
   assert_int_equal(sonde_predict_solid(b.model, &b.sites, &b.m, &def, NULL, force_n, &error),
                    SONDE_ARGUMENT);
   assert_says(&error, "relative_sd");
+  sonde_fit_solid_result r;
+  def = coarse(), def.contact.layer[SONDE_SOLID_FAT].exponent = -2;
+  assert_int_equal(sonde_fit_solid(b.model, &b.sites, &b.m, &def, NULL, &r, force_n, &error),
+                   SONDE_ARGUMENT);
+  assert_says(&error, "-2");
   def = coarse(), def.version = 0;
   assert_int_equal(sonde_predict_solid(b.model, &b.sites, &b.m, &def, NULL, force_n, &error),
                    SONDE_ARGUMENT);

@@ -185,6 +185,14 @@ static sonde_status open_search(search *s, bool fit, sonde_error *error) {
                                  {"zero_sd_m", s->def->zero_sd_m, 0, 0.05},
                                  {"tare_sd_n", s->def->tare_sd_n, 0, 100}};
   if (!status) status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  // What is sought are logarithms.
+  for (int k = 0; k < SONDE_SOLID_LAYERS && !status && fit; ++k) {
+    const sonde_hyperelastic *m = &s->def->contact.layer[k];
+    if (!(m->shear_pa > 0 && m->exponent > 0))
+      status = sonde_fail(error, SONDE_ARGUMENT,
+                          "a fit begins with positive moduli and exponents, not %g Pa and %g",
+                          m->shear_pa, m->exponent);
+  }
   if (!status)
     status = sonde_sites_check_on_surface(s->model, s->sites, SONDE_SITE_TOLERANCE_M, error);
   if (!status)

@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# sonde fit --solid: a coarse solid fitted to one site predicts another and a third probe; sonde solve takes its table of
+# moduli; what does not fit together is refused.
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+source "$here/common.sh"
+fit=(fit "$DATA/indentation.csv" --surface "$DATA/skin.ply" --sites "$DATA/sites.csv" --solid)
+gives "fitted.all.count>=6 fitted.all.count<=6 fitted.ln_rms<=0.1 left_out.all.count>=6 left_out.all.count<=6 left_out.ln_rms<=0.15 \
+  never_fitted.all.count>=6 never_fitted.all.count<=6 moduli.muscle.shear_kpa>=1 moduli.muscle.shear_kpa<=8 moduli.skin.shear_measured:bool \
+  rows>=6 rows<=6 converged:bool" \
+  "${fit[@]}" --at 30 --check 27 --depths 3 --edge-mm 25 --growth 3 --unexplained 0.05 --also "$DATA/indentation_square.csv" \
+  -o "$work/moduli.csv" --json
+gives 'contact=bonded' solve "$MODEL" --site 27 --depths 1 --contact bonded --edge-mm 25 --growth 3 --moduli "$work/moduli.csv" --json
+rejects 'goes without --fat' solve "$MODEL" --site 27 --depths 1 --moduli "$work/moduli.csv" --fat 1:8
+rejects 'site 99 has no measurements' "${fit[@]}" --at 99 -o "$work/none.csv"
+rejects '\--at: expected' "${fit[@]}" --at 1,x -o "$work/none.csv"
+rejects '\--solid goes without' "${fit[@]}" --model linear -o "$work/none.csv"
+rejects 'muscle-prior' "${fit[@]}" --muscle-prior -3:9 -o "$work/none.csv"
+finish
