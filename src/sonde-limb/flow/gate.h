@@ -20,7 +20,8 @@ struct sonde_gate {
   double frequency_hz, pulse_hz, tissue_m_s, loss_db;
   uint64_t seed, numbers; // of random numbers since the scatterers were drawn
   double half_m[3];       // of the box that holds the scatterers
-  double blood, tissue;   // amplitudes: of a scatterer, of the tissue in the gate now
+  double blood;           // amplitude of a scatterer
+  double tissue, heard;   // amplitudes: of the tissue in the gate, and as it is heard by now
   double tissue_phase;
   uint64_t pulses, next; // since the columns began; number of the next pulse, from time 0
   double echo[SONDE_DOPPLER_BINS][2];

@@ -110,6 +110,7 @@ void sonde_gate_put(sonde_gate *g, const sonde_flow_scene *scene,
   }
   // Beside the beam there is always some tissue.
   g->tissue = pow(10, tissue_db / 20) * sqrt(solid / fmax(all, 1e-9) + pow(10, -aside_db / 10));
+  if (!same || settings->x_m != before.x_m || settings->z_m != before.z_m) g->heard = g->tissue;
   g->put = true;
 }
 
@@ -205,11 +206,14 @@ void gate_step(sonde_gate *g, const sonde_flow_scene *scene, double step_s) {
   const double left = pow(10, -g->loss_db / 20), noise = pow(10, noise_db / 20) / sqrt(2);
   const double turns =
       4 * SONDE_PI * g->frequency_hz / COLOUR_SOUND_M_S * g->tissue_m_s / g->pulse_hz;
+  // What a new picture makes of the tissue comes gently: a step would be heard at all frequencies.
+  const double gentle_s = 0.1, follows = 1 - exp(-1 / (gentle_s * g->pulse_hz));
   for (uint32_t p = 0; p < pulses; ++p) {
     double *echo = g->echo[g->pulses++ % BINS];
+    g->heard += follows * (g->tissue - g->heard);
     g->tissue_phase = fmod(g->tissue_phase + turns, 2 * SONDE_PI);
-    echo[0] = left * (sum[p][0] + g->tissue * cos(g->tissue_phase));
-    echo[1] = left * (sum[p][1] + g->tissue * sin(g->tissue_phase));
+    echo[0] = left * (sum[p][0] + g->heard * cos(g->tissue_phase));
+    echo[1] = left * (sum[p][1] + g->heard * sin(g->tissue_phase));
     for (int c = 0; c < 2; ++c) echo[c] += noise * sonde_random_normal(g->seed, g->numbers++);
   }
   g->next = end;
