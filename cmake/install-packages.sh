@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# install-packages.sh GROUP...: sees to it that the Debian packages of the groups "build" and "test"
-# are there. Installs what is missing as root or through sudo; otherwise prints the one command
+# install-packages.sh GROUP...: sees to it that the Debian packages of the groups "build", "test" and
+# "package" are there. Installs what is missing as root or through sudo; otherwise prints the one command
 # that would and exits with 2. Asks nothing and touches nothing when everything is there.
 set -euo pipefail
 
@@ -63,6 +63,13 @@ test_packages() {
   installed python3-vtk9 || missing+=(python3-vtk9) # reads MetaImage and NRRD files as others do
 }
 
+package_packages() {
+  need_command dpkg-buildpackage dpkg-dev
+  need_command dh debhelper
+  need_command dh_python3 dh-python
+  need_command lintian lintian
+}
+
 check_node() {
   local major
   major=$(node --version | sed 's/^v\([0-9]*\).*/\1/')
@@ -105,7 +112,8 @@ for group in "$@"; do
   case $group in
   build) build_packages ;;
   test) test_packages ;;
-  *) echo "install-packages.sh: unknown group '$group', expected build or test" >&2; exit 2 ;;
+  package) package_packages ;;
+  *) echo "install-packages.sh: unknown group '$group', expected build, test or package" >&2; exit 2 ;;
   esac
 done
 if ((${#missing[@]})); then
