@@ -27,7 +27,7 @@ static int drop_subject(void **state) {
 // A body that takes what it does not know from the subject.
 static sonde_limb_body as_subject(sonde_limb_body known, sonde_limb_part_fit *fit) {
   sonde_error error = {0};
-  sonde_limb_body body;
+  sonde_limb_body body = {0};
   if (sonde_limb_part_body(&part, 3, &known, fit, &error) ||
       sonde_limb_draw(&known, 3, &body, &error))
     fail_msg("%s", error.message);
