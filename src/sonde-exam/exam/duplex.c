@@ -60,8 +60,7 @@ sonde_duplex_controls sonde_duplex_clean(const sonde_duplex_controls *wanted,
                 {&c.scale_m_s, before->scale_m_s, 0.01, 1},
                 {&c.gain_db, before->gain_db, -30, 20}};
   for (size_t i = 0; i < SONDE_COUNT_OF(NUMBER); ++i) {
-    double value = isfinite(*NUMBER[i].to) ? *NUMBER[i].to : NUMBER[i].from;
-    *NUMBER[i].to = clamp(value, NUMBER[i].low, NUMBER[i].high);
+    *NUMBER[i].to = clamp_wanted(*NUMBER[i].to, NUMBER[i].from, NUMBER[i].low, NUMBER[i].high);
   }
   c.box.right_m = fmax(c.box.right_m, c.box.left_m + least_m);
   c.box.bottom_m = fmax(c.box.bottom_m, c.box.top_m + least_m);

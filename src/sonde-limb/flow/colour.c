@@ -5,6 +5,8 @@
 #include "base/maths.h"
 #include "base/random.h"
 
+#include <string.h>
+
 void sonde_colour_place(const sonde_colour_box *box, uint32_t line, uint32_t row, double xz_m[2]) {
   SONDE_ASSERT(box && line < SONDE_COLOUR_LINES && row < SONDE_COLOUR_ROWS);
   const double x = box->left_m + (box->right_m - box->left_m) * (line + 0.5) / SONDE_COLOUR_LINES;
@@ -34,12 +36,11 @@ sonde_colour_def sonde_colour_def_default(void) {
 
 double sonde_colour_limit(const sonde_colour_def *def) {
   SONDE_ASSERT(def && def->frequency_hz > 0);
-  return COLOUR_SOUND_M_S * def->pulse_hz / (4 * def->frequency_hz);
+  return doppler_limit(def->frequency_hz, def->pulse_hz);
 }
 
 enum { LIMITS = 8 };
-static sonde_bounded limit_of(const sonde_colour_def *def, int k) {
-  SONDE_ASSERT(k >= 0 && k < LIMITS);
+static void list_limits(const sonde_colour_def *def, sonde_bounded limit[LIMITS]) {
   const sonde_bounded LIMIT[LIMITS] = {{"frequency", def->frequency_hz, 1e6, 2e7},
                                        {"pulse repetition", def->pulse_hz, 100, 2e4},
                                        {"packet", def->packet, 4, COLOUR_PACKET},
@@ -48,13 +49,15 @@ static sonde_bounded limit_of(const sonde_colour_def *def, int k) {
                                        {"noise", def->noise_db, -100, 40},
                                        {"clutter", def->clutter_db, -100, 80},
                                        {"persistence", def->persistence, 0, 0.95}};
-  return LIMIT[k];
+  memcpy(limit, LIMIT, sizeof LIMIT);
 }
 
 bool sonde_colour_tune(sonde_colour *c, const sonde_colour_def *def) {
   SONDE_ASSERT(c && def);
+  sonde_bounded limit[LIMITS];
+  list_limits(def, limit);
   for (int k = 0; k < LIMITS; ++k)
-    if (!sonde_bounded_holds(limit_of(def, k))) return false;
+    if (!sonde_bounded_holds(limit[k])) return false;
   const uint64_t seed = c->def.seed;
   c->def = *def, c->def.seed = seed;
   // Orthonormal polynomials over the packet, by Gram and Schmidt.
@@ -77,11 +80,10 @@ sonde_status sonde_colour_create(const sonde_colour_def *def, sonde_colour **out
                                  sonde_error *error) {
   SONDE_ASSERT(def && out);
   *out = NULL;
-  for (int k = 0; k < LIMITS; ++k) {
-    const sonde_bounded limit = limit_of(def, k);
-    sonde_status status = sonde_bounded_check(&limit, 1, error);
-    if (status) return status;
-  }
+  sonde_bounded limit[LIMITS];
+  list_limits(def, limit);
+  sonde_status status = sonde_bounded_check(limit, LIMITS, error);
+  if (status) return status;
   sonde_colour *c = SONDE_NEW(sonde_colour, 1);
   if (!c) return sonde_fail_memory(error);
   c->def.seed = def->seed;

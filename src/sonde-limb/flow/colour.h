@@ -6,6 +6,10 @@
 
 enum { COLOUR_PACKET = 16, COLOUR_ORDER = 3, COLOUR_NORMALS = 1 << 16 };
 #define COLOUR_SOUND_M_S 1540.0
+// Velocity along the beam from which pulses of a rate fold.
+static inline double doppler_limit(double frequency_hz, double pulse_hz) {
+  return COLOUR_SOUND_M_S * pulse_hz / (4 * frequency_hz);
+}
 
 struct sonde_colour {
   sonde_colour_def def;

@@ -24,8 +24,7 @@ sonde_gate_settings sonde_gate_clean(const sonde_gate_settings *wanted,
                 {&s.filter_hz, before->filter_hz, 10, 1000},
                 {&s.gain_db, before->gain_db, -30, 30}};
   for (size_t i = 0; i < SONDE_COUNT_OF(NUMBER); ++i) {
-    const double value = isfinite(*NUMBER[i].to) ? *NUMBER[i].to : NUMBER[i].from;
-    *NUMBER[i].to = clamp(value, NUMBER[i].low, NUMBER[i].high);
+    *NUMBER[i].to = clamp_wanted(*NUMBER[i].to, NUMBER[i].from, NUMBER[i].low, NUMBER[i].high);
   }
   return s;
 }

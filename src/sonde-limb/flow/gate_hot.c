@@ -233,7 +233,7 @@ uint32_t sonde_gate_columns(const sonde_gate *g, sonde_gate_column *column) {
 sonde_gate_spectrum sonde_gate_axes(const sonde_gate *g) {
   SONDE_ASSERT(g != NULL);
   if (!g->put) return (sonde_gate_spectrum){.on = false};
-  const double limit_m_s = COLOUR_SOUND_M_S * g->pulse_hz / (4 * g->frequency_hz);
+  const double limit_m_s = doppler_limit(g->frequency_hz, g->pulse_hz);
   const double shift = round(g->settings.baseline * (BINS / 2)) - BINS / 2 - 0.5;
   return (sonde_gate_spectrum){.on = true,
                                .settings = g->settings,

@@ -31,7 +31,8 @@ static double clot_scale(const piece *p, uint32_t i) {
   return free > 0 ? (1 - solid) * all / free : 1;
 }
 
-// What the blood at a place of the picture's plane is and how it moves; false beside the blood.
+// What the blood at a place of the picture's plane is and how it moves; false, and nothing is
+// written, beside the blood.
 static bool blood_at(const piece *p, sonde_vec3 drawn, scene_blood *blood) {
   const sonde_flow_scene *s = p->scene;
   const sonde_vec3 d = v_sub(v_sub(drawn, p->offset), p->low->centre_m);
@@ -157,6 +158,6 @@ void scene_find_blood(const sonde_flow_scene *s, const sonde_echo *echo, const s
           !find_piece(s, echo, depth_m, v, i, &p))
         continue;
       for (uint32_t n = 0; n < count; ++n)
-        if (blood[n].drive < 0 && !blood_at(&p, drawn[n], &blood[n])) blood[n].drive = -1;
+        if (blood[n].drive < 0) (void)blood_at(&p, drawn[n], &blood[n]);
     }
 }

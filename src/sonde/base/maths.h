@@ -175,6 +175,10 @@ static inline sonde_pose pose_inverse(sonde_pose a_from_b) {
 static inline double clamp(double x, double low, double high) {
   return x < low ? low : (x > high ? high : x);
 }
+// A wanted number within its range; the one before stands in where none is wanted.
+static inline double clamp_wanted(double wanted, double before, double low, double high) {
+  return clamp(isfinite(wanted) ? wanted : before, low, high);
+}
 
 // Whole nanometres: results of the maths library that differ in the last bit become equal.
 static inline double whole_nm(double m) { return nearbyint(m * 1e9) / 1e9; }
