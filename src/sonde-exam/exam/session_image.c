@@ -112,36 +112,38 @@ bool sonde_session_follow(sonde_session *session) {
   return true;
 }
 
+// Depth of the face below the resting skin. Along the axis from well outside, the first crossing is
+// the skin above the face, whether the face is above or below it; beside the thigh the signed
+// closest distance takes over.
+static double face_depth(const sonde_surface_index *rest, const sonde_snapshot *snapshot) {
+  const double back_m = 0.15, reach_m = 0.3;
+  const sonde_pose pose = snapshot->world_from_probe;
+  const sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
+  const sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
+  sonde_surface_point hit;
+  if (!sonde_surface_inside(rest, outside) &&
+      sonde_surface_raycast(rest, outside, axis, reach_m, &hit))
+    return back_m - v_dot(v_sub(hit.point_m, outside), axis);
+  const double distance_m = sonde_surface_closest(rest, pose.position).distance_m;
+  return sonde_surface_inside(rest, pose.position) ? distance_m : -distance_m;
+}
+
 void sonde_session_draw(sonde_session *session) {
   SONDE_ASSERT(session->surface != NULL);
   sonde_frame *frame = (void *)sonde_mailbox_write_slot(session->frame_box);
   unsigned char *out = (unsigned char *)frame;
   const sonde_surface_slot *head = (const void *)session->surface;
-  // Depth of the face below the resting skin: along the axis from well outside to the first
-  // crossing; beside the thigh the signed closest distance takes over.
-  const sonde_surface_index *rest = session->subject->rest_skin;
-  const double back_m = 0.15, reach_m = 0.3;
-  const sonde_pose pose = head->snapshot.world_from_probe;
-  sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
-  sonde_vec3 outside = v_madd(pose.position, -back_m, axis);
-  sonde_surface_point hit;
-  double depth_m, coupling = couple(session, session->surface);
-  if (!sonde_surface_inside(rest, outside) &&
-      sonde_surface_raycast(rest, outside, axis, reach_m, &hit)) {
-    depth_m = back_m - v_dot(v_sub(hit.point_m, outside), axis);
-  } else {
-    depth_m = (sonde_surface_inside(rest, pose.position) ? 1 : -1) *
-              sonde_surface_closest(rest, pose.position).distance_m;
-  }
   // The skin in single precision.
   const double *positions_m = (const void *)(session->surface + session->positions_at);
   float *skin_m = (float *)(void *)(out + session->skin_at);
   for (size_t i = 0; i < 3 * session->nodes; ++i) skin_m[i] = (float)positions_m[i];
-  sonde_image image = {session->image_width,    session->image_height, 0, 0, 0,
-                       out + session->pixels_at};
+  sonde_image image = {.width = session->image_width,
+                       .height = session->image_height,
+                       .pixels = out + session->pixels_at};
   sonde_frame_colour colour = {.over.pixels = out + session->colour_at};
   const float *gel = head->controls.gel ? session->line_coupling : NULL;
-  frame->spectrum.on = false;
+  const double coupling = couple(session, session->surface);
+  sonde_gate_spectrum spectrum = {.on = false};
   bool off = head->snapshot.flags & SONDE_FLAG_INSIDE_OUT; // the probe sees no body
   if (session->echo && !off) {
     sonde_echo_settings settings = with_beam(&session->beam, head->controls.echo);
@@ -157,7 +159,7 @@ void sonde_session_draw(sonde_session *session) {
       sonde_duplex_draw(session->duplex, &moment, &image, settings.frequency_hz, gel,
                         session->lines, &colour);
       sonde_duplex_hear(session->duplex, &moment, &image, settings.frequency_hz, gel,
-                        session->lines, (void *)(out + session->spectrum_at), &frame->spectrum);
+                        session->lines, (void *)(out + session->spectrum_at), &spectrum);
     }
   } else {
     memset(image.pixels, 0, (size_t)image.width * image.height);
@@ -172,7 +174,7 @@ void sonde_session_draw(sonde_session *session) {
                          .width_m = image.width_m,
                          .height_m = image.height_m,
                          .colour = colour,
-                         .spectrum = frame->spectrum};
+                         .spectrum = spectrum};
   frame->snapshot.gel_coupling = coupling;
   const double *film_m = (const void *)(session->surface + session->film_at);
   double gel_m3 = gel ? 0 : (double)NAN;
@@ -181,7 +183,7 @@ void sonde_session_draw(sonde_session *session) {
   frame->snapshot.gel_volume_m3 = gel_m3;
   frame->snapshot.venous_pressure_pa = head->pathology.venous_pressure_pa;
   frame->snapshot.arterial_pressure_pa = head->pathology.arterial_pressure_pa;
-  frame->snapshot.penetration_m = depth_m;
+  frame->snapshot.penetration_m = face_depth(session->subject->rest_skin, &head->snapshot);
   if (session->interior && !off) sonde_snapshot_read_vessels(session->interior, &frame->snapshot);
   // All pixels so far, so that one number tells whether a replay shows the same.
   if (session->image_checks) {
