@@ -670,26 +670,23 @@ static int run(void *from) {
     status = load_layer(a->muscle, a->surface, "muscle_surface.ply", &inputs.muscle, &error);
   if (!status) status = sonde_measurements_examine(&inputs.measurements, &out.doubts, &error);
   if (!status) status = decide(a, &out, 0, &error);
-  char provenance[256];
-  const sonde_model_def def = define_model(a, &inputs, provenance);
-  if (!status && a->solid) {
-    const fit_solid_job job = {.def = &def,
-                               .sites = &inputs.sites,
-                               .measurements = &inputs.measurements,
-                               .also = &inputs.also,
-                               .options = &a->hyperelastic,
-                               .at = a->at,
-                               .check = a->check,
-                               .depths = (uint32_t)a->depths,
-                               .beside = a->beside,
-                               .output = a->output,
-                               .json = a->json};
-    status = fit_solid_run(&job, &error);
-    out.result.converged = true;
-  } else if (!status && a->kind != SONDE_TWO_LAYER) {
-    const fit_bulk_job job = {&def,     &inputs.sites, &inputs.measurements,
-                              &a->bulk, a->output,     a->json};
-    status = fit_bulk_run(&job, &error);
+  if (!status && (a->solid || a->kind != SONDE_TWO_LAYER)) {
+    char provenance[256];
+    const sonde_model_def def = define_model(a, &inputs, provenance);
+    const fit_bulk_job bulk = {&def,     &inputs.sites, &inputs.measurements,
+                               &a->bulk, a->output,     a->json};
+    const fit_solid_job solid = {.def = &def,
+                                 .sites = &inputs.sites,
+                                 .measurements = &inputs.measurements,
+                                 .also = &inputs.also,
+                                 .options = &a->hyperelastic,
+                                 .at = a->at,
+                                 .check = a->check,
+                                 .depths = (uint32_t)a->depths,
+                                 .beside = a->beside,
+                                 .output = a->output,
+                                 .json = a->json};
+    status = a->solid ? fit_solid_run(&solid, &error) : fit_bulk_run(&bulk, &error);
     out.result.converged = true;
   } else if (!status) {
     status = fit_model(a, &inputs, &out, &error);

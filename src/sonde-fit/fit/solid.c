@@ -144,15 +144,21 @@ static bool report_part(double fraction, const char *what, void *user) {
   return sonde_progress_report(s->progress, fmin(part, 0.99), s->what);
 }
 
-static sonde_status press_all(search *s, const double *theta, sonde_error *error) {
+// Layers of parameters; those that were believed beforehand give laws and ratios K/mu.
+static void layers_of(const search *s, const double *theta,
+                      sonde_hyperelastic layer[SONDE_SOLID_LAYERS]) {
+  for (int k = 0; k < SONDE_SOLID_LAYERS; ++k) {
+    const sonde_hyperelastic *prior = &s->def->contact.layer[k];
+    const double shear_pa = exp(theta[2 * k]);
+    layer[k] = (sonde_hyperelastic){prior->energy, shear_pa, exp(theta[2 * k + 1]),
+                                    prior->bulk_pa / prior->shear_pa * shear_pa};
+  }
+}
+
+static sonde_status press_all(search *s, sonde_error *error) {
   const sonde_progress progress = {.report = report_part, .user = s};
   ++s->evaluations;
-  for (int k = 0; k < SONDE_SOLID_LAYERS && theta; ++k) {
-    sonde_hyperelastic *m = &s->solid.layer[k];
-    const double ratio = m->bulk_pa / m->shear_pa;
-    m->shear_pa = exp(theta[2 * k]), m->exponent = exp(theta[2 * k + 1]);
-    m->bulk_pa = ratio * m->shear_pa;
-  }
+  layers_of(s, s->trial.theta, s->solid.layer);
   const uint32_t workers = sonde_parallel_workers(s->def->threads, s->plan.curve_count);
   return sonde_parallel_run(s->plan.curve_count, workers, press_curve, s, &progress, s->what,
                             error);
@@ -296,15 +302,18 @@ static sonde_status evaluate(void *user, double *cost, sonde_error *error) {
     offsets_of(s, c, at);
     for (int k = 0; k < 2; ++k) s->offset[c][k] = at[k] < s->count ? s->trial.theta[at[k]] : 0;
   }
-  const sonde_status status = press_all(s, s->trial.theta, error);
+  const sonde_status status = press_all(s, error);
   if (!status) *cost = cost_of(s, &s->trial, NULL);
   return status;
 }
 
-static void accept(void *user, double cost, double fall, bool *done) {
-  search *s = user;
+static void take_trial(search *s) {
   const standing other = s->now;
   s->now = s->trial, s->trial = other;
+}
+
+static void accept(void *user, double cost, double fall, bool *done) {
+  take_trial(user);
   *done = fall < 1e-3 * cost;
 }
 
@@ -316,28 +325,27 @@ static sonde_status linearise(void *user, double *cost, bool *done, sonde_error 
   *done = false;
   if (s->evaluations) {
     *cost = cost_of(s, &s->now, NULL);
-  } else {
-    uint32_t all = 0;
-    for (uint32_t c = 0; c < plan->curve_count; ++c)
-      s->used[c] = plan->curve_start[c + 1] - plan->curve_start[c];
-    for (uint32_t k = 0; k < s->count; ++k) {
-      double precision;
-      s->trial.theta[k] = prior_of(s, k, &precision);
-    }
-    const sonde_status status = evaluate(s, cost, error);
-    if (status) return status;
-    for (uint32_t c = 0; c < plan->curve_count; ++c) {
-      uint32_t good = 0;
-      while (good < s->used[c] && isfinite(s->trial.force_n[plan->curve_start[c] + good])) ++good;
-      all += s->used[c] = good;
-    }
-    if (all == 0)
-      return sonde_fail(error, SONDE_CONVERGENCE,
-                        "no measurement has an equilibrium with the moduli at the start");
-    *cost = cost_of(s, &s->trial, NULL), s->start_rms = rms_of(s, &s->trial);
-    accept(s, *cost, *cost, done);
-    *done = false;
+    return SONDE_OK;
   }
+  uint32_t all = 0;
+  for (uint32_t c = 0; c < plan->curve_count; ++c)
+    s->used[c] = plan->curve_start[c + 1] - plan->curve_start[c];
+  for (uint32_t k = 0; k < s->count; ++k) {
+    double precision;
+    s->trial.theta[k] = prior_of(s, k, &precision);
+  }
+  const sonde_status status = evaluate(s, cost, error);
+  if (status) return status;
+  for (uint32_t c = 0; c < plan->curve_count; ++c) {
+    uint32_t good = 0;
+    while (good < s->used[c] && isfinite(s->trial.force_n[plan->curve_start[c] + good])) ++good;
+    all += s->used[c] = good;
+  }
+  if (all == 0)
+    return sonde_fail(error, SONDE_CONVERGENCE,
+                      "no measurement has an equilibrium with the moduli at the start");
+  *cost = cost_of(s, &s->trial, NULL), s->start_rms = rms_of(s, &s->trial);
+  take_trial(s);
   return SONDE_OK;
 }
 
@@ -431,14 +439,8 @@ static sonde_status conclude(search *s, sonde_fit_solid_result *result, sonde_er
     const double sd = sqrt(inverse[(size_t)k * n + k]);
     result->certainty.ln_sd[k / 2][k % 2] = sd;
     result->certainty.measured[k / 2][k % 2] = sd * sd * precision < 0.25;
-    sonde_hyperelastic *m = &result->layer[k / 2];
-    if (k % 2 == 0) *m = s->def->contact.layer[k / 2];
-    const double ratio = m->bulk_pa / m->shear_pa, value = exp(s->now.theta[k]);
-    if (k % 2)
-      m->exponent = value;
-    else
-      m->shear_pa = value, m->bulk_pa = ratio * value;
   }
+  layers_of(s, s->now.theta, result->layer);
   sonde_free(inverse);
   if (!definite) return sonde_fail(error, SONDE_CONVERGENCE, "the moduli have no finite variance");
   return SONDE_OK;
