@@ -77,20 +77,13 @@ static uint32_t read_levels(const char *text, double *level) {
     memcpy(level, USUAL, sizeof USUAL);
     return sizeof USUAL / sizeof *USUAL;
   }
-  uint32_t count = 0;
-  while (*text && count < MOST_LEVELS) {
-    const char *end;
-    level[count] = sonde_parse_real(text, &end);
-    if (end == text || (*end && *end != ',') || !(level[count] >= -0.2 && level[count] <= 2)) break;
-    ++count;
-    if (!*end) return count;
-    text = end + 1;
-  }
-  app_usage_error(VERB,
-                  "--levels: expected up to %d numbers from -0.2 to 2 with commas between "
-                  "them, but got '%s'",
-                  MOST_LEVELS, text);
-  return 0;
+  const uint32_t count = app_read_numbers(text, -0.2, 2, level, MOST_LEVELS);
+  if (count == 0)
+    app_usage_error(VERB,
+                    "--levels: expected up to %d numbers from -0.2 to 2 with commas between "
+                    "them, but got '%s'",
+                    MOST_LEVELS, text);
+  return count;
 }
 
 static int check(void *from) {
@@ -291,10 +284,10 @@ static int run(void *from) {
   sonde_limb_part_fit fit = {0};
   sonde_status status = a->measured ? sonde_model_load(a->measured, &subject, &error) : SONDE_OK;
   part.model = subject;
-  if (!status && subject)
-    status = sonde_limb_part_body(&part, (uint64_t)a->seed, &known, &fit, &error);
+  if (!status && subject) status = sonde_limb_part_body(&part, (uint64_t)a->seed, &known, &error);
   if (!status) status = sonde_limb_draw(&known, (uint64_t)a->seed, &body, &error);
   if (!status) status = sonde_limb_create(&body, &limb, &error);
+  if (!status && subject) status = sonde_limb_part_compare(&part, limb, &fit, &error);
   if (!status && a->position >= 0) {
     sonde_limb_setting setting = sonde_limb_setting_usual((sonde_limb_position)a->position);
     status = sonde_limb_pose_create(limb, &setting, &pose, &error);

@@ -49,14 +49,8 @@ static void prepare(void *to) {
 // Numbers between commas; false after saying what is wrong.
 static bool read_list(const char *option, const char *text, double low, double high, double *list,
                       uint32_t most, uint32_t *count) {
-  for (*count = 0; *count < most;) {
-    const char *end;
-    const double x = sonde_parse_real(text, &end);
-    if (end == text || (*end && *end != ',') || !(x >= low && x <= high)) break;
-    list[(*count)++] = x;
-    if (!*end) return true;
-    text = end + 1;
-  }
+  *count = app_read_numbers(text, low, high, list, most);
+  if (*count > 0) return true;
   app_usage_error(VERB, "%s \"%s\": expected at most %u numbers from %g to %g with commas between",
                   option, text, most, low, high);
   return false;

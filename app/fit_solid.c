@@ -2,6 +2,7 @@
 #include "fit_solid.h"
 
 #include "fit_common.h"
+#include "options.h"
 
 #include <assert.h>
 #include <math.h>
@@ -20,20 +21,20 @@ typedef struct part {
 
 enum { FITTED, LEFT_OUT, NEVER, PARTS };
 
-// Whole numbers between commas; "all": every site that is measured and not among the others.
+// Ids of sites between commas.
 static sonde_status read_sites(const char *option, const char *text, const sonde_site_table *table,
                                uint32_t *list, uint32_t *count, sonde_error *error) {
-  for (*count = 0; *count < table->count;) {
-    const char *end;
-    const double x = sonde_parse_real(text, &end);
-    if (end == text || (*end && *end != ',') || !(x >= 0 && x <= 1e6) || x != floor(x)) break;
-    list[(*count)++] = (uint32_t)x;
-    if (!*end) return SONDE_OK;
-    text = end + 1;
-  }
-  return app_error(error, SONDE_ARGUMENT,
-                   "--%s: expected at most %u numbers of sites with commas between", option,
-                   table->count);
+  double *number = calloc(table->count, sizeof *number);
+  if (!number) return error->status = SONDE_MEMORY;
+  *count = app_read_numbers(text, 0, 1e6, number, table->count);
+  bool whole = *count > 0;
+  for (uint32_t k = 0; k < *count; ++k)
+    list[k] = (uint32_t)number[k], whole = whole && number[k] == floor(number[k]);
+  free(number);
+  return whole ? SONDE_OK
+               : app_error(error, SONDE_ARGUMENT,
+                           "--%s: expected at most %u numbers of sites with commas between", option,
+                           table->count);
 }
 
 // Sites of the table that are measured and not in the list.

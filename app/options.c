@@ -334,6 +334,18 @@ uint32_t app_list_parameters(app_option *list, uint32_t room, const sonde_parame
   return count;
 }
 
+uint32_t app_read_numbers(const char *text, double low, double high, double *list, uint32_t most) {
+  for (uint32_t count = 0; count < most;) {
+    const char *end;
+    const double x = sonde_parse_real(text, &end);
+    if (end == text || (*end && *end != ',') || !(x >= low && x <= high)) return 0;
+    list[count++] = x;
+    if (!*end) return count;
+    text = end + 1;
+  }
+  return 0;
+}
+
 bool app_option_given(const char *name) { return given_name(name, strlen(name)); }
 
 void app_command_line(char *text, size_t room) {

@@ -101,6 +101,9 @@ int app_options_read(const app_command *command, int argc, char **argv, void *op
 // Whether the words that were read last had this option; and those words as they were typed, the
 // ones with blanks in quotes.
 bool app_option_given(const char *name);
+// Reads up to `most` numbers from low to high with commas between them; returns how many, 0 when
+// the text is anything else.
+uint32_t app_read_numbers(const char *text, double low, double high, double *list, uint32_t most);
 void app_command_line(char *text, size_t room);
 
 #endif
