@@ -23,12 +23,6 @@ typedef struct sonde_limb_part {
   double from_m; /**< of its z = 0 below the hip joint; NaN: its middle at that of the thigh */
 } sonde_limb_part;
 
-/** How a body goes with a part. */
-typedef struct sonde_limb_part_fit {
-  double from_level, to_level; /**< where the part lies: 0 hip, 1 knee joint line */
-  double girth_rms;            /**< of ln(girth of the subject / girth of the limb) on the part */
-} sonde_limb_part_fit;
-
 /**
  * Takes from a measured part what a body does not know yet: girths of thigh and knee that follow
  * the subject's, fat, skin and the femur's diameter at the middle of the thigh.
@@ -37,8 +31,16 @@ typedef struct sonde_limb_part_fit {
  * @thread owner
  */
 SONDE_API sonde_status sonde_limb_part_body(const sonde_limb_part *part, uint64_t seed,
-                                            sonde_limb_body *known, sonde_limb_part_fit *fit,
-                                            sonde_error *error);
+                                            sonde_limb_body *known, sonde_error *error);
+
+/** How a limb goes with a part. */
+typedef struct sonde_limb_part_fit {
+  double from_level, to_level; /**< where the part lies: 0 hip, 1 knee joint line */
+  double girth_rms;            /**< of ln(girth of the subject / girth of the limb) on the part */
+} sonde_limb_part_fit;
+/** @return as sonde_limb_part_body() @thread owner */
+SONDE_API sonde_status sonde_limb_part_compare(const sonde_limb_part *part, const sonde_limb *limb,
+                                               sonde_limb_part_fit *fit, sonde_error *error);
 
 /** How the model of a limb is made. */
 typedef struct sonde_limb_model_def {

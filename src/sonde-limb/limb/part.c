@@ -1,15 +1,18 @@
-// A measured subject on its part of a limb: the body that is as thick as the subject, and the
-// subject's springs at the nodes of the part.
+// A measured subject takes its part of a limb: the body becomes as thick as the subject, and the
+// nodes of the skin there get the subject's springs.
 #include "limb/part.h"
 
 #include "limb/bones.h"
 
 enum { MOST_ROWS = 128, RAYS = 120 };
-static const double ROW_M = 0.01, END_M = 0.012; // sections; the first and last from either end
-static const double FARTHEST_M = 0.3;            // of the skin from a section's middle
-static const double BLEND_M = 0.03;              // over which springs go over at either end
-static const double LEAST_M = 0.1;               // of a part
-// Levels between which a limb's girths are given, and those of which a thigh may be a part.
+// Sections follow each other at ROW_M; the first and the last lie END_M from the subject's ends.
+static const double ROW_M = 0.01, END_M = 0.012;
+static const double FARTHEST_M = 0.3; // no skin is farther from a section's middle
+// Springs change from the subject's to the limb's over this distance from the part's ends.
+static const double BLEND_M = 0.03;
+static const double LEAST_M = 0.1; // a subject is at least as long
+// A body's girths of thigh and knee are measured at the levels THIGH and KNEE; a part lies between
+// LOW and HIGH.
 static const double THIGH = 0.12, KNEE = 0.88, LOW = -0.05, HIGH = 1.05;
 
 typedef struct section {
@@ -21,12 +24,12 @@ struct limb_measured {
   const limb_held *held; // the limb, or NULL
   double from_m;         // of the subject's z = 0 below the hip
   sonde_surface_index *skin;
-  section row[MOST_ROWS]; // of the subject
-  section own[MOST_ROWS]; // of the limb there, at rest, a right one
+  section row[MOST_ROWS]; // sections of the subject
+  section own[MOST_ROWS]; // sections of the limb at the same heights, of a right limb at rest
   uint32_t rows;
 };
 
-// A closed line given by its radius about a middle.
+// Measures the closed line that has these radii about a middle.
 static section section_of(const double radius_m[RAYS], double x_m, double y_m, double z_m) {
   section s = {.z_m = z_m};
   double area = 0, sx = 0, sy = 0;
@@ -42,7 +45,7 @@ static section section_of(const double radius_m[RAYS], double x_m, double y_m, d
   return s;
 }
 
-// Where a ray from a section's middle leaves the subject's skin.
+// Finds where a ray from a section's middle leaves the subject's skin; false when none does.
 static bool find_skin(const limb_measured *m, double x_m, double y_m, double z_m, double angle_rad,
                       sonde_surface_point *hit) {
   return sonde_surface_raycast(m->skin, vec3(x_m, y_m, z_m),
@@ -71,7 +74,7 @@ static sonde_status measure(const sonde_limb_part *part, limb_measured *m, sonde
   for (uint32_t k = 0; k < m->rows && !status; ++k) {
     const double z = low + END_M + k * ROW_M;
     double radius[RAYS];
-    // The middle: of the vertices near the section.
+    // Rays begin at the mean of the vertices near the section.
     uint32_t near = 0;
     sonde_vec3 sum = vec3(0, 0, 0);
     for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
@@ -95,7 +98,7 @@ static double level_of(const sonde_limb *limb, const limb_measured *m, double z_
   return limb_level(limb, -(m->from_m + z_m));
 }
 
-// Finds the levels of both ends on a limb.
+// Finds the levels of the subject's ends on a limb, and from_m where it is not given.
 static sonde_status place(const sonde_limb *limb, limb_measured *m, double level[2],
                           sonde_error *error) {
   const double first = m->row[0].z_m - END_M, last = m->row[m->rows - 1].z_m + END_M;
@@ -108,7 +111,7 @@ static sonde_status place(const sonde_limb *limb, limb_measured *m, double level
                     m->model->name, level[0], level[1], 1e3 * thigh, LOW, HIGH);
 }
 
-// A number of the part's nodes where a ray meets the skin.
+// Interpolates a number of the subject's nodes to where a ray meets the skin.
 static double at_hit(const limb_measured *m, const double *number, const sonde_surface_point *hit) {
   const uint32_t *face = m->model->surface.faces[hit->face];
   double sum = 0;
@@ -116,7 +119,8 @@ static double at_hit(const limb_measured *m, const double *number, const sonde_s
   return sum;
 }
 
-// Fat, skin and bone of the subject at the limb's middle of the thigh, or as near as it reaches.
+// Measures the subject's fat, skin and bone at the middle of the limb's thigh, or as near to it as
+// the subject reaches.
 static void find_layers(const sonde_limb *limb, const limb_measured *m, sonde_limb_body *found) {
   const sonde_model *model = m->model;
   const double half_m = 0.5 * sonde_limb_body_of(limb)->thigh_length_m - m->from_m;
@@ -147,7 +151,8 @@ static void find_layers(const sonde_limb *limb, const limb_measured *m, sonde_li
   if (near > 8) found->shaft_m = 2 * radius;
 }
 
-// Compares girths on the part: logarithm of the subject's over the limb's, as a line of the level.
+// Compares girths: the logarithm of the subject's over the limb's, fitted by a line of the level.
+// @return its root mean square
 static double compare_girths(const sonde_limb *limb, const limb_measured *m, double line[2]) {
   double n = 0, sl = 0, sll = 0, sr = 0, slr = 0, squares = 0;
   for (uint32_t k = 0; k < m->rows; ++k) {
@@ -161,14 +166,12 @@ static double compare_girths(const sonde_limb *limb, const limb_measured *m, dou
 }
 
 sonde_status sonde_limb_part_body(const sonde_limb_part *part, uint64_t seed,
-                                  sonde_limb_body *known, sonde_limb_part_fit *fit,
-                                  sonde_error *error) {
-  SONDE_ASSERT(part && part->model && known && fit);
+                                  sonde_limb_body *known, sonde_error *error) {
+  SONDE_ASSERT(part && part->model && known);
   limb_measured m;
   sonde_limb_body body, found = *known;
   sonde_limb *limb = NULL;
   double level[2], line[2];
-  *fit = (sonde_limb_part_fit){0};
   sonde_status status = measure(part, &m, error);
   if (!status) status = sonde_limb_draw(known, seed, &body, error);
   if (!status) status = sonde_limb_create(&body, &limb, error);
@@ -185,18 +188,26 @@ sonde_status sonde_limb_part_body(const sonde_limb_part *part, uint64_t seed,
       const double from = *sonde_parameter_of(&found, &p[k]);
       if (isnan(*to) && !isnan(from)) *to = clamp(from, p[k].low, p[k].high);
     }
-    sonde_limb_destroy(limb);
-    limb = NULL;
-    status = sonde_limb_draw(known, seed, &body, error);
   }
-  if (!status) status = sonde_limb_create(&body, &limb, error);
-  if (!status) *fit = (sonde_limb_part_fit){level[0], level[1], compare_girths(limb, &m, line)};
   sonde_limb_destroy(limb);
   sonde_surface_index_destroy(m.skin);
   return status;
 }
 
-// Middles of the sections at a height of the subject's z: of the subject and of the limb.
+sonde_status sonde_limb_part_compare(const sonde_limb_part *part, const sonde_limb *limb,
+                                     sonde_limb_part_fit *fit, sonde_error *error) {
+  SONDE_ASSERT(part && part->model && limb && fit);
+  limb_measured m;
+  double level[2], line[2];
+  *fit = (sonde_limb_part_fit){0};
+  sonde_status status = measure(part, &m, error);
+  if (!status) status = place(limb, &m, level, error);
+  if (!status) *fit = (sonde_limb_part_fit){level[0], level[1], compare_girths(limb, &m, line)};
+  sonde_surface_index_destroy(m.skin);
+  return status;
+}
+
+// Interpolates the middles of the subject's and of the limb's sections at a z of the subject.
 static void middles(const limb_measured *m, double z_m, double subject_m[2], double limb_m[2]) {
   const double at = clamp((z_m - m->row[0].z_m) / ROW_M, 0, m->rows - 1.000001);
   const uint32_t k = (uint32_t)at;
