@@ -79,6 +79,12 @@ export function label(name: string): string {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
+/** The value of a rising list so many places beside the one that is nearest to `now`. */
+export function beside(list: number[], now: number, way: number): number {
+  const nearest = list.reduce((best, v, k) => (Math.abs(v - now) < Math.abs(list[best]! - now) ? k : best), 0);
+  return list[Math.max(0, Math.min(list.length - 1, nearest + way))]!;
+}
+
 /** 65.2 -> "1:05" */
 export function minutes(time_s: number): string {
   const s = Math.max(0, Math.floor(time_s));

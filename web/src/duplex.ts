@@ -1,7 +1,7 @@
 // Doppler over the image: the colours, the box with its bar, and the buttons of scanner and free hand.
 
 import type { Connection } from "./connection";
-import { announce, draw, find, make, press, pressed, stepper } from "./dom";
+import { announce, beside, draw, find, make, press, pressed, stepper } from "./dom";
 import type { ColourFrame, ColourShown, Controls } from "./protocol";
 
 const SCALES_CM_S = [1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 40, 60, 100];
@@ -235,8 +235,7 @@ export class Duplex {
 
   private scale(way: number): void {
     const now = this.controls?.colour_scale_cm_s ?? 6;
-    const nearest = SCALES_CM_S.reduce((best, s, k) => (Math.abs(s - now) < Math.abs(SCALES_CM_S[best]! - now) ? k : best), 0);
-    this.connection.colour({ colour_scale_cm_s: SCALES_CM_S[Math.max(0, Math.min(SCALES_CM_S.length - 1, nearest + way))]! });
+    this.connection.colour({ colour_scale_cm_s: beside(SCALES_CM_S, now, way) });
   }
 
   private gain(way: number): void {

@@ -1,7 +1,7 @@
 // The gate of pulsed Doppler: its beam, sample volume and angle cursor over the image, its buttons and keys.
 
 import type { Connection } from "./connection";
-import { draw, find, make, press, pressed, stepper } from "./dom";
+import { beside, draw, find, make, press, pressed, stepper } from "./dom";
 import type { Controls, GateKey, SpectrumFrame } from "./protocol";
 import type { DopplerSound } from "./sound";
 
@@ -232,9 +232,6 @@ export class GateTools {
   }
 
   private step(key: GateKey, way: number): void {
-    const now = this.controls?.[key] ?? 0;
-    const list = STEPS[key];
-    const nearest = list.reduce((best, v, k) => (Math.abs(v - now) < Math.abs(list[best]! - now) ? k : best), 0);
-    this.connection.gate({ [key]: list[Math.max(0, Math.min(list.length - 1, nearest + way))]! });
+    this.connection.gate({ [key]: beside(STEPS[key], this.controls?.[key] ?? 0, way) });
   }
 }
