@@ -329,22 +329,27 @@ static double vein_colour(const sonde_session *session, const sonde_frame *frame
   return 2 * shown > there ? sum / shown : 0;
 }
 
-// Along the vein, lightly: colour shows its blood, a squeeze of the calf speeds it up, a strain
-// stops it; in a clot nothing flows, and it comes back when colour is switched on again.
-static void colour_follows_blood_and_hand(void **state) {
+// A session whose probe lies along the vein, lightly, and whose blood flows.
+static sonde_session *open_along_vein(sonde_session_def *def) {
   sonde_site site = barrel_site();
   site.u = vec3(0, 0, 1), site.v = vec3(0, -1, 0);
   const sonde_script_key keys[] = {{0, sonde_site_pose(&site, -0.002)},
                                    {0.1, sonde_site_pose(&site, 0.003)}};
   sonde_device device;
   assert_int_equal(sonde_device_script(keys, 2, 1e-3, &device, NULL), SONDE_OK);
+  def->circulate = true;
+  def->controls.echo.depth_m = 0.05;
+  return open_session(def, device);
+}
+
+// Along the vein, lightly: colour shows its blood, a squeeze of the calf speeds it up, a strain
+// stops it; in a clot nothing flows, and it comes back when colour is switched on again.
+static void colour_follows_blood_and_hand(void **state) {
   sonde_session_def def = small_def(*state);
-  def.circulate = true;
-  def.controls.echo.depth_m = 0.05;
   def.controls.duplex.shown = SONDE_DUPLEX_VELOCITY;
   def.controls.duplex.box = (sonde_colour_box){-0.012, 0.012, 0.001, 0.05, 0.35};
   def.controls.duplex.scale_m_s = 0.3;
-  sonde_session *session = open_session(&def, device);
+  sonde_session *session = open_along_vein(&def);
   sonde_session_controls c = sonde_session_controls_now(session);
   sonde_frame frame = run(session, 400);
   const double rest = vein_colour(session, &frame);
@@ -402,17 +407,9 @@ static course hear(sonde_session *session, uint32_t images) {
 // A gate in the vein hears its blood, a column each hundredth of a second; a squeeze speeds it up,
 // in a clot and beside the vein there is none.
 static void a_gate_hears_blood_and_hand(void **state) {
-  sonde_site site = barrel_site();
-  site.u = vec3(0, 0, 1), site.v = vec3(0, -1, 0);
-  const sonde_script_key keys[] = {{0, sonde_site_pose(&site, -0.002)},
-                                   {0.1, sonde_site_pose(&site, 0.003)}};
-  sonde_device device;
-  assert_int_equal(sonde_device_script(keys, 2, 1e-3, &device, NULL), SONDE_OK);
   sonde_session_def def = small_def(*state);
-  def.circulate = true;
-  def.controls.echo.depth_m = 0.05;
   def.controls.duplex.gated = true;
-  sonde_session *session = open_session(&def, device);
+  sonde_session *session = open_along_vein(&def);
   sonde_frame frame = run(session, 200);
   sonde_vessel_state vein;
   const sonde_pose across = {
