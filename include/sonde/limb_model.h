@@ -51,8 +51,8 @@ typedef struct sonde_limb_model_def {
   double damping_s;   /**< time of the normal dampers; 20 ms */
   /** NULL: the straight limb, lying; else in this position, whose pressures its veins have */
   const sonde_limb_setting *setting;
-  /** NULL, or whose springs the skin has where the part lies; 30 mm from its ends they begin to go
-   * over into those that follow from the layers */
+  /** NULL, or whose springs the skin has where the part lies; from 42 to 12 mm before its ends
+   * they go over into those that follow from the layers */
   const sonde_limb_part *part;
 } sonde_limb_model_def;
 SONDE_API sonde_limb_model_def sonde_limb_model_def_default(void); /**< @thread any */

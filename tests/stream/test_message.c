@@ -379,6 +379,30 @@ static void bad_commands_are_refused(void **state) {
   assert_int_equal(parse("{\"type\":\"stop\",\"x\":\"[[[[[{{{{\"}", &c), SONDE_OK); // in a string
 }
 
+// A gate's numbers are taken to either end of their ranges and refused beyond.
+static void a_gate_s_numbers_are_bounded(void **state) {
+  (void)state;
+  static const struct {
+    const char *key;
+    double low, high;
+  } NUMBER[] = {{"length_mm", 0.5, 15}, {"steer_deg", -20, 20},  {"angle_deg", -80, 80},
+                {"scale_cm_s", 2, 200}, {"baseline", -0.9, 0.9}, {"filter_hz", 10, 1000},
+                {"gain_db", -30, 30}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(NUMBER); ++k) {
+    const double spare = 0.01 * (NUMBER[k].high - NUMBER[k].low);
+    const double value[] = {NUMBER[k].low, NUMBER[k].high, NUMBER[k].low - spare,
+                            NUMBER[k].high + spare};
+    for (int i = 0; i < 4; ++i) {
+      char text[96];
+      page_command c;
+      snprintf(text, sizeof text, "{\"type\":\"controls\",\"gate_%s\":%.9g}", NUMBER[k].key,
+               value[i]);
+      if ((parse(text, &c) == SONDE_OK) != (i < 2))
+        fail_msg("%s: %s", i < 2 ? "refused" : "accepted", text);
+    }
+  }
+}
+
 static void size_zero_bytes_and_depth_are_bounded(void **state) {
   (void)state;
   page_command c;
@@ -487,6 +511,7 @@ int main(void) {
       cmocka_unit_test(a_goal_is_read_in_si),
       cmocka_unit_test(controls_leave_out_what_is_absent),
       cmocka_unit_test(bad_commands_are_refused),
+      cmocka_unit_test(a_gate_s_numbers_are_bounded),
       cmocka_unit_test(size_zero_bytes_and_depth_are_bounded),
       cmocka_unit_test(controls_out_of_range_are_refused_by_name),
       cmocka_unit_test(mangled_messages_do_no_harm),
