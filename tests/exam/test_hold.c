@@ -44,7 +44,7 @@ static void holds_without_creep(void **state) {
   for (int i = 0; i < 5000; ++i) sonde_session_step(session);
   moment start = look(session), now = start;
   double way_m = 0, force_n = 0;
-  const int hold_ms = SAMPLES(60000, 8000);
+  const int hold_ms = SAMPLES(60000, 3000);
   for (int i = 0; i < hold_ms; ++i) {
     sonde_session_step(session);
     now = look(session);

@@ -1,5 +1,6 @@
 // Files of tracked sequences and volumes: round trips, orientation, foreign dialects, damage with
 // file and line, INVALID frames, joined transforms, real recordings.
+#include "../sanitized.h"
 #include "fixture.h"
 #include "sweep/frames.h"
 
@@ -209,7 +210,7 @@ static void no_cut_goes_unnoticed(void **state) {
     size_t count;
     assert_int_equal(sonde_sequence_save(path_of(NAMES[k / 2]), &s, k % 2, NULL), SONDE_OK);
     assert_int_equal(sonde_file_load(path_of(NAMES[k / 2]), &bytes, &count, NULL), SONDE_OK);
-    for (size_t cut = 0; cut < count; ++cut) {
+    for (size_t cut = 0; cut < count; cut += ROUNDS(1, 7)) {
       write_bytes("cut", bytes, cut);
       assert_int_not_equal(sonde_sequence_load(path_of("cut"), &t, NULL), SONDE_OK);
     }

@@ -423,6 +423,7 @@ static void the_cases_that_ship_are_good(void **state) {
   sonde_case *cases;
   sonde_exam_protocol *protocols;
   uint32_t count, sick = 0, ways;
+  const uint32_t every = SAMPLES(1, 4); // so many cases have one that is built
   sonde_error error = {0};
   if (sonde_case_list(SONDE_SOURCE_DIR "/data/cases", &cases, &count, &error) ||
       sonde_exam_protocol_list(SONDE_SOURCE_DIR "/data/protocols", &protocols, &ways, &error))
@@ -437,6 +438,7 @@ static void the_cases_that_ship_are_good(void **state) {
     for (uint32_t k = 0; k < i; ++k)
       if (cases[k].seed == cases[i].seed)
         fail_msg("%s and %s are the same leg", cases[k].id, cases[i].id);
+    if (i % every != 0) continue;
     sonde_case_setup setup;
     if (build(&cases[i], &setup, &error)) fail_msg("%s", error.message);
     check_texts(&cases[i], &setup.map);

@@ -261,9 +261,15 @@ static void condensed_solid_is_rebuilt_from_its_file(void **unused) {
   for (int k = 0; k < 2; ++k) sonde_state_destroy(state[k]);
   sonde_model_destroy(model);
   sonde_model_destroy(read);
-  model = make_ball(SONDE_CONDENSED_SOLID, NULL, 4e-3);
+}
+
+static void too_fine_a_condensed_solid_is_refused(void **unused) {
+  (void)unused;
+  sonde_state *state;
+  sonde_error error = {0};
+  sonde_model *model = make_ball(SONDE_CONDENSED_SOLID, NULL, 4e-3);
   sonde_world_def def = fixture_world_def();
-  assert_int_equal(sonde_state_create(model, &def, &state[0], &error), SONDE_ARGUMENT);
+  assert_int_equal(sonde_state_create(model, &def, &state, &error), SONDE_ARGUMENT);
   assert_non_null(strstr(error.message, "expected at most 2500"));
   sonde_model_destroy(model);
 }
@@ -403,6 +409,7 @@ int main(void) {
       cmocka_unit_test(condensed_solid_moves_like_the_whole),
       cmocka_unit_test(condensed_solid_rests_and_creeps_back),
       cmocka_unit_test(condensed_solid_is_rebuilt_from_its_file),
+      cmocka_unit_test(too_fine_a_condensed_solid_is_refused),
       cmocka_unit_test(single_precision_follows_double),
       cmocka_unit_test(twice_the_stiffness_is_twice_the_force),
       cmocka_unit_test(file_keeps_the_body),
