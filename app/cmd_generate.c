@@ -1,5 +1,5 @@
 // sonde generate: makes a thigh from named parameters and a seed, or from scanned surfaces.
-#include "options.h"
+#include "leg_scan.h"
 
 #include <assert.h>
 #include <math.h>
@@ -10,8 +10,9 @@ static const char VERB[] = "generate";
 enum { MOST_DRAWS = 32 }; // of what finds room in a scanned leg
 
 typedef struct options {
-  const char *output, *section, *skin, *femur, *muscle, *labels, *names;
-  int left, axes; // axes -1: not given
+  const char *output, *section;
+  leg_scan_files scan;
+  int left;
   bool json;
   long seed;
   double fat_m, edge_m, fine_edge_m; // fat NaN: not given
@@ -25,7 +26,7 @@ static void prepare(void *to) {
                              .edge_m = 6 * 1e-3,
                              .fine_edge_m = 3 * 1e-3,
                              .sex = -1,
-                             .axes = -1,
+                             .scan = {.axes = -1},
                              .known = sonde_thigh_unknown()};
 }
 
@@ -40,7 +41,6 @@ typedef struct work {
 
 static const char *const SEXES[] = {"female", "male", NULL};
 static const char *const SIDES[] = {"right", "left", NULL};
-static const char *const AXES[] = {"ras", "lps", NULL};
 
 static const app_option TABLE[] = {
     OPT_INTEGER(seed, "seed", "N", 0, 4294967295, "of what is drawn"),
@@ -53,20 +53,8 @@ static const app_option TABLE[] = {
     OPT_JSON(json),
     OPT_GROUP("From a scanned leg: surfaces (.ply, .obj, .stl in mm) or labels; length and girths "
               "are measured, what the scan does not show is drawn"),
-    OPT_TEXT(skin, "skin", "FILE", "skin of a leg, longer than the thigh"),
-    OPT_TEXT(femur, "femur", "FILE",
-             "whole femur in the same frame; without it the skin's upper end is the groin"),
-    OPT_TEXT(muscle, "muscle", "FILE",
-             "envelope of the muscles; without it fat comes from parameters"),
-    OPT_TEXT(labels, "labels", "FILE", "volume of labels (.nii, .nii.gz) instead of the surfaces"),
-    OPT_TEXT(names, "label-names", "FILE",
-             "a number and a name on each line, with one of the words background, tissue, skin, "
-             "fat, muscle, femur, bone, vein, artery; default 1 skin, 2 fat, 3 muscle, 4 bone, "
-             "5 vein, 6 artery"),
+    LEG_SCAN_OPTIONS("", "longer than the thigh"),
     OPT_WORD(left, "side", "SIDE", SIDES, "a left leg is mirrored"),
-    OPT_WORD(axes, "axes", "AXES", AXES,
-             "where x and y of the surfaces run: ras (right, front) or lps (left, back); z to the "
-             "head; labels are ras"),
     OPT_GROUP("Parameters; what is not given is drawn"),
     OPT_REAL(fat_m, "fat-mm", "F", 4, 35, 1e-3,
              "mean fat of the four sides at mid-thigh, in usual proportions")};
@@ -80,14 +68,8 @@ static uint32_t list_parameters(app_option *list, uint32_t room) {
 
 static int check(void *from) {
   options *a = from;
-  if ((a->femur || a->muscle) && !a->skin)
-    return app_usage_error(VERB, "--femur and --muscle go together with --skin, which is missing");
-  if (a->labels && (a->skin || a->axes >= 0))
-    return app_usage_error(VERB, "--labels goes without --skin, --femur, --muscle and --axes");
-  if (a->names && !a->labels) return app_usage_error(VERB, "--label-names needs --labels");
-  if (a->skin && !a->femur && a->axes < 0)
-    return app_usage_error(VERB, "--skin without --femur needs --axes ras or lps: which side of it "
-                                 "is in front cannot be seen from the skin");
+  const int found = leg_scan_check(VERB, "", &a->scan);
+  if (found) return found;
   if (a->sex >= 0) a->known.sex = a->sex ? SONDE_SEX_MALE : SONDE_SEX_FEMALE;
 
   // Fat of the four sides with the proportions of the distributions' means; a side that is given by
@@ -127,11 +109,11 @@ static void print(const options *a, work *w) {
       app_json_close();
     }
     app_json_close();
-    if (a->skin || a->labels) {
+    if (leg_scan_given(&a->scan)) {
       app_json_integer("rays_missed", w->leg.missed);
       app_json_text("drawn", w->drawn);
     }
-    if (a->labels)
+    if (a->scan.labels)
       app_json("voxel_mm:%g filled_share:%g", w->part.voxel_m * 1e3, w->part.filled_share);
     app_json_text("model", a->output);
     app_json_end();
@@ -154,23 +136,13 @@ static void print(const options *a, work *w) {
 
 // Draws what is not known, takes the shape from that or from the scan, and makes the model of it.
 static sonde_status make(const options *a, work *w, uint64_t seed, sonde_error *error) {
-  const bool scanned = a->skin || a->labels;
-  const sonde_mesh *femur = w->part.femur.face_count ? &w->part.femur : NULL;
-  const sonde_mesh *muscle = w->part.muscle.face_count ? &w->part.muscle : NULL;
-  sonde_axes axes = SONDE_AXES_ANY;
-  if (a->labels || a->axes >= 0) axes = a->axes == 1 ? SONDE_AXES_LPS : SONDE_AXES_RAS;
-  const sonde_leg_scan scan = {.skin = &w->part.skin,
-                               .femur = femur,
-                               .muscle = muscle,
-                               .left = a->left == 1,
-                               .axes = axes,
-                               .vein = &w->part.vein,
-                               .artery = &w->part.artery,
-                               .length_m = isnan(a->known.length_m) ? 0 : a->known.length_m};
+  const bool scanned = leg_scan_given(&a->scan);
+  sonde_leg_scan scan = leg_scan_of(&a->scan, &w->part, a->left == 1);
+  if (!isnan(a->known.length_m)) scan.length_m = a->known.length_m;
   sonde_thigh known = a->known;
   sonde_status status = SONDE_OK;
   // A bone that is drawn follows the girths: it is drawn once more with those of the scan.
-  for (int pass = 0; !status && pass < (scanned && !femur ? 2 : 1); ++pass) {
+  for (int pass = 0; !status && pass < (scanned && !scan.femur ? 2 : 1); ++pass) {
     sonde_thigh_shape_destroy(w->shape);
     w->shape = NULL;
     status = sonde_thigh_draw(&known, seed, &w->thigh, error);
@@ -182,8 +154,8 @@ static sonde_status make(const options *a, work *w, uint64_t seed, sonde_error *
     known.girth_distal_m = w->thigh.girth_distal_m;
   }
   if (scanned)
-    snprintf(w->drawn, sizeof w->drawn, "%s%s%s%sbranches, mechanics", femur ? "" : "femur, ",
-             muscle ? "" : "fat, ", w->leg.vein_found ? "" : "vein, ",
+    snprintf(w->drawn, sizeof w->drawn, "%s%s%s%sbranches, mechanics", scan.femur ? "" : "femur, ",
+             scan.muscle ? "" : "fat, ", w->leg.vein_found ? "" : "vein, ",
              w->leg.artery_found ? "" : "artery, ");
 
   char provenance[200];
@@ -204,15 +176,11 @@ static int run(void *from) {
   work w = {0};
   sonde_error error = {0}, later;
   app_progress_begin("making the thigh");
-  sonde_status status = SONDE_OK;
-  if (a->labels) status = sonde_leg_labels_load(a->labels, a->names, &w.part, &error);
-  if (a->skin) status = sonde_mesh_load(a->skin, 1e-3, &w.part.skin, &error);
-  if (!status && a->femur) status = sonde_mesh_load(a->femur, 1e-3, &w.part.femur, &error);
-  if (!status && a->muscle) status = sonde_mesh_load(a->muscle, 1e-3, &w.part.muscle, &error);
+  sonde_status status = leg_scan_load(&a->scan, &w.part, &error);
 
   // What is drawn may find no room in a leg that is given; then it is drawn again, from numbers
   // that no other seed takes. The first complaint is the one to tell.
-  const int tries = a->skin || a->labels ? MOST_DRAWS : 1;
+  const int tries = leg_scan_given(&a->scan) ? MOST_DRAWS : 1;
   bool loaded = !status;
   for (int k = 0; loaded && (k == 0 || status == SONDE_ARGUMENT) && k < tries; ++k)
     status = make(a, &w, (uint64_t)a->seed + ((uint64_t)k << 32), k ? &later : &error);

@@ -1,7 +1,7 @@
 // sonde limb: a lower limb from a body and a seed: its table, labelled sections, a view, a walk
 // along the vein, stations; at rest or in a position.
+#include "leg_scan.h"
 #include "limb_film.h"
-#include "options.h"
 
 #include <assert.h>
 #include <math.h>
@@ -13,6 +13,7 @@ static const char VERB[] = "limb";
 typedef struct options {
   const char *atlas, *skin, *levels, *model, *film, *measured;
   double measured_from_m;
+  leg_scan_files scan;
   bool json, stations;
   long seed;
   int sex, side, position; // -1: drawn, right, at rest
@@ -25,6 +26,7 @@ static void prepare(void *to) {
                              .side = -1,
                              .position = -1,
                              .measured_from_m = NAN,
+                             .scan = {.axes = -1},
                              .known = sonde_limb_unknown()};
 }
 
@@ -48,7 +50,9 @@ static const app_option TABLE[] = {
     OPT_TEXT(levels, "levels", "L,L...",
              "levels of the sections: 0 hip, 1 knee joint line, 2 ankle; default -0.05 to 1.9"),
     OPT_OUTPUT(film, "film", "FILE", "write a walk along the main vein as an animated PNG"),
-    OPT_OUTPUT(skin, "skin", "FILE", "write the skin as .ply, .obj or .stl, mm"),
+    OPT_OUTPUT(skin, "skin", "FILE",
+               "write the skin as .ply, .obj or .stl, mm; x y z to the patient's left, back and "
+               "head (LPS)"),
     OPT_OUTPUT(model, "model", "FILE",
                "write the limb as a model (.sonde) that can be pressed and imaged"),
     OPT_TEXT(measured, "measured", "FILE",
@@ -58,6 +62,9 @@ static const app_option TABLE[] = {
              "where that thigh's z = 0 lies below the hip joint; default its middle at that of the "
              "thigh"),
     OPT_JSON(json),
+    OPT_GROUP("From a scanned leg: surfaces (.ply, .obj, .stl in mm) or labels; lengths, girths, "
+              "fat and bones that it shows are measured, all else is drawn"),
+    LEG_SCAN_OPTIONS("scan-", "from the groin to below the ankle, with a femur to the knee"),
     OPT_GROUP("Parameters of the body; what is not given is drawn")};
 
 // The parameters of a body, as the library lists them.
@@ -93,6 +100,10 @@ static int check(void *from) {
   if (!read_levels(a->levels, level)) return APP_BAD_INPUT;
   if (!isnan(a->measured_from_m) && !a->measured)
     return app_usage_error(VERB, "--measured-from-mm needs --measured");
+  if (leg_scan_given(&a->scan) && a->measured)
+    return app_usage_error(VERB, "--measured goes without a scan");
+  const int found = leg_scan_check(VERB, "scan-", &a->scan);
+  if (found) return found;
   if (a->sex >= 0) a->known.sex = a->sex ? SONDE_SEX_MALE : SONDE_SEX_FEMALE;
   a->known.side = a->side == 1 ? SONDE_LIMB_LEFT : SONDE_LIMB_RIGHT;
   return APP_OK;
@@ -115,10 +126,17 @@ static void find_stations(const sonde_limb *limb, const sonde_limb_pose *pose,
     sonde_limb_stations(limb, station);
 }
 
+// What the limb was made from, besides parameters.
+typedef struct origin {
+  sonde_limb_part_fit part;  // of a measured subject
+  sonde_limb_body scanned;   // NaN: not in the scan
+  double girth_rms, voxel_m; // limb over scan; of the volume
+} origin;
+
 static const double GIRTHS[] = {0.12, 0.25, 0.5, 0.75, 0.88, 1, 1.15, 1.28, 1.5, 1.75, 1.86};
 
 static void print_json(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose,
-                       const sonde_limb_part_fit *fit) {
+                       origin *from) {
   sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
@@ -152,8 +170,18 @@ static void print_json(const options *a, const sonde_limb *limb, const sonde_lim
   if (a->measured) {
     app_json_object("measured");
     app_json_text("file", a->measured);
-    app_json("from_level:%g to_level:%g girth_rms_percent:%g", fit->from_level, fit->to_level,
-             100 * fit->girth_rms);
+    app_json("from_level:%g to_level:%g girth_rms_percent:%g", from->part.from_level,
+             from->part.to_level, 100 * from->part.girth_rms);
+    app_json_close();
+  }
+  if (leg_scan_given(&a->scan)) {
+    app_json_object("scan");
+    app_json_array("measured");
+    for (uint32_t k = 0; k < count; ++k)
+      if (!isnan(*sonde_parameter_of(&from->scanned, &p[k]))) app_json_text(NULL, p[k].name);
+    app_json_close();
+    app_json_real("girth_rms_percent", 100 * from->girth_rms);
+    if (a->scan.labels) app_json_real("voxel_mm", 1e3 * from->voxel_m);
     app_json_close();
   }
   if (pose) app_json_text("position", POSITIONS[a->position]);
@@ -189,7 +217,7 @@ static void print_json(const options *a, const sonde_limb *limb, const sonde_lim
 }
 
 static void print_text(const options *a, const sonde_limb *limb, const sonde_limb_pose *pose,
-                       const sonde_limb_part_fit *fit) {
+                       origin *from) {
   sonde_limb_body body = *sonde_limb_body_of(limb);
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
@@ -199,10 +227,20 @@ static void print_text(const options *a, const sonde_limb *limb, const sonde_lim
     printf("%-20s %8.2f  %s\n", p[k].name, *sonde_parameter_of(&body, &p[k]) / p[k].unit,
            p[k].text);
   }
+  if (leg_scan_given(&a->scan)) {
+    printf("\nmeasured on the scan:");
+    const char *comma = " ";
+    for (uint32_t k = 0; k < count; ++k)
+      if (!isnan(*sonde_parameter_of(&from->scanned, &p[k])))
+        printf("%s%s", comma, p[k].name), comma = ", ";
+    printf("; all else is drawn by the rules, vessels too\ngirths within %.1f %% (rms) of the "
+           "scan's\n",
+           100 * from->girth_rms);
+  }
   if (a->measured)
     printf("\n%s from level %.2f to %.2f: girths within %.1f %% (rms), springs of the "
            "measurements\n",
-           a->measured, fit->from_level, fit->to_level, 100 * fit->girth_rms);
+           a->measured, from->part.from_level, from->part.to_level, 100 * from->part.girth_rms);
   printf("\nlevel   girth mm\n");
   for (size_t k = 0; k < sizeof GIRTHS / sizeof *GIRTHS; ++k)
     printf("%5.2f   %8.0f\n", GIRTHS[k], 1e3 * sonde_limb_girth(limb, GIRTHS[k]));
@@ -269,25 +307,63 @@ static sonde_status write_table(const sonde_limb *limb, const sonde_limb_pose *p
   return sonde_file_commit(file, error);
 }
 
-static int run(void *from) {
-  const options *a = from;
+enum { MOST_DRAWS = 32 }; // of what finds room in a scanned leg
+
+// The limb of a scan. What is drawn may find no room in it: then it is drawn again, from numbers
+// that no other seed takes. The first complaint is the one to tell.
+static sonde_status make_scanned(const options *a, sonde_limb **limb, origin *from,
+                                 sonde_error *error) {
+  assert(!*limb);
+  sonde_leg_labels part = {0};
+  sonde_leg_girths girths;
+  sonde_error later;
+  sonde_limb_body known = a->known, body;
+  sonde_status status = leg_scan_load(&a->scan, &part, error);
+  const sonde_leg_scan scan = leg_scan_of(&a->scan, &part, a->side == 1);
+  if (!status) status = sonde_leg_scan_body(&scan, (uint64_t)a->seed, &known, &girths, error);
+  const bool measured = !status;
+  for (int k = 0; measured && (k == 0 || status == SONDE_ARGUMENT) && k < MOST_DRAWS; ++k) {
+    sonde_error *to = k ? &later : error;
+    status = sonde_limb_draw(&known, (uint64_t)a->seed + ((uint64_t)k << 32), &body, to);
+    if (!status) status = sonde_limb_create(&body, limb, to);
+  }
+  if (!status) from->girth_rms = sonde_leg_compare(&girths, *limb);
+  // What was given as a parameter was not measured.
+  uint32_t count;
+  const sonde_parameter *p = sonde_limb_parameters(&count);
+  from->scanned = known, from->voxel_m = part.voxel_m;
+  from->scanned.stature_m = from->scanned.bmi = NAN; // follow from length and girth
+  for (uint32_t k = 0; k < count; ++k)
+    if (!isnan(*sonde_parameter_of(&known, &p[k])) &&
+        *sonde_parameter_of(&known, &p[k]) == *sonde_parameter_of((void *)&a->known, &p[k]))
+      *sonde_parameter_of(&from->scanned, &p[k]) = NAN;
+  sonde_leg_labels_clear(&part);
+  return status;
+}
+
+static int run(void *given) {
+  const options *a = given;
   assert(a->seed >= 0);
-  sonde_limb_body body;
   sonde_limb *limb = NULL;
   sonde_limb_pose *pose = NULL;
   sonde_mesh skin = {0};
   sonde_error error = {0};
   app_progress_begin("making the limb");
   sonde_model *model = NULL, *subject = NULL;
-  sonde_limb_body known = a->known;
+  sonde_limb_body known = a->known, body;
   sonde_limb_part part = {NULL, a->measured_from_m};
-  sonde_limb_part_fit fit = {0};
+  origin from = {0};
   sonde_status status = a->measured ? sonde_model_load(a->measured, &subject, &error) : SONDE_OK;
   part.model = subject;
   if (!status && subject) status = sonde_limb_part_body(&part, (uint64_t)a->seed, &known, &error);
-  if (!status) status = sonde_limb_draw(&known, (uint64_t)a->seed, &body, &error);
-  if (!status) status = sonde_limb_create(&body, &limb, &error);
-  if (!status && subject) status = sonde_limb_part_compare(&part, limb, &fit, &error);
+  if (!status && leg_scan_given(&a->scan))
+    status = make_scanned(a, &limb, &from, &error);
+  else if (!status) {
+    status = sonde_limb_draw(&known, (uint64_t)a->seed, &body, &error);
+    if (!status) status = sonde_limb_create(&body, &limb, &error);
+  }
+  if (!status) body = *sonde_limb_body_of(limb);
+  if (!status && subject) status = sonde_limb_part_compare(&part, limb, &from.part, &error);
   if (!status && a->position >= 0) {
     sonde_limb_setting setting = sonde_limb_setting_usual((sonde_limb_position)a->position);
     status = sonde_limb_pose_create(limb, &setting, &pose, &error);
@@ -317,6 +393,8 @@ static int run(void *from) {
              subject->name, subject->provenance);
     def.part = &part, def.provenance = provenance;
   }
+  if (leg_scan_given(&a->scan))
+    def.provenance = "Synthetic limb with the measures of a scanned leg";
   sonde_limb_setting setting;
   if (pose) setting = sonde_limb_pose_setting(pose), def.setting = &setting;
   if (!status && a->model) status = sonde_limb_model(&body, &def, &model, &error);
@@ -326,9 +404,16 @@ static int run(void *from) {
   if (!status && a->skin)
     status = pose ? sonde_limb_pose_skin(pose, 0.004, &skin, &error)
                   : sonde_limb_skin(limb, 0.004, &skin, &error);
+  // The limb's frame is left-handed (medial, front, up); a file has the patient's left, back and
+  // head.
+  for (uint32_t i = 0; i < skin.vertex_count; ++i) skin.vertices[i].y = -skin.vertices[i].y;
+  for (uint32_t i = 0; i < skin.face_count; ++i) {
+    const uint32_t second = skin.faces[i][1];
+    skin.faces[i][1] = skin.faces[i][2], skin.faces[i][2] = second;
+  }
   if (!status && a->skin) status = sonde_mesh_save(a->skin, 1e-3, &skin, &error);
   app_progress_end();
-  if (!status) (a->json ? print_json : print_text)(a, limb, pose, &fit);
+  if (!status) (a->json ? print_json : print_text)(a, limb, pose, &from);
   sonde_mesh_clear(&skin);
   sonde_limb_pose_destroy(pose);
   sonde_limb_destroy(limb);

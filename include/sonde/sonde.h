@@ -48,6 +48,7 @@
 #include "sonde/limb_model.h"
 #include "sonde/limb_pose.h"
 #include "sonde/limb_vessels.h"
+#include "sonde/anatomy_limb.h"
 #include "sonde/exam.h"
 #include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"

@@ -1,4 +1,5 @@
 // From scanned surfaces of a leg to the shape of a thigh.
+#include "anatomy/scan.h"
 #include "anatomy/shape.h"
 
 #include <stdlib.h>
@@ -14,25 +15,12 @@ static const double LEAST_SKIN_M = 0.2, MOST_SKIN_M = 1.3, WHOLE_LEG_M = 0.6, TH
 static const double UPPER_END_M = 0.005, WIDEST_LEG_M = 0.12;
 static const double REACH_M = 0.25, BONE_REACH_M = 0.07, WIDEST_BONE = 1.6; // of the shaft
 
-// Columns of x, y, z: model_from_scan p = axes^T (p - origin).
-typedef struct frame {
-  sonde_vec3 origin, x, y, z;
-  double low, high; // extent of the femur along z, from the origin
-} frame;
-
-static sonde_vec3 to_scan(const frame *f, sonde_vec3 p) {
-  return v_madd(v_madd(v_madd(f->origin, p.x, f->x), p.y, f->y), p.z, f->z);
-}
-static sonde_vec3 to_frame(const frame *f, sonde_vec3 p) {
-  sonde_vec3 d = v_sub(p, f->origin);
-  return vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
-}
 static sonde_vec3 across(sonde_vec3 d, sonde_vec3 axis) { return v_madd(d, -v_dot(d, axis), axis); }
 
 // Largest principal direction of the vertices within [low, high] along the axis, by power
 // iteration.
-static sonde_vec3 wide_direction(const sonde_mesh *mesh, const frame *f, double low, double high,
-                                 bool only_across) {
+static sonde_vec3 wide_direction(const sonde_mesh *mesh, const scan_frame *f, double low,
+                                 double high, bool only_across) {
   sonde_vec3 mean = vec3(0, 0, 0);
   sonde_mat3 moment = m_zero();
   uint32_t count = 0;
@@ -52,7 +40,7 @@ static sonde_vec3 wide_direction(const sonde_mesh *mesh, const frame *f, double 
   return direction;
 }
 
-static void measure_extent(const sonde_mesh *femur, frame *f) {
+void scan_extent(const sonde_mesh *femur, scan_frame *f) {
   SONDE_ASSERT(femur->vertex_count > 0 && v_norm2(f->z) > 0.5);
   f->low = INFINITY, f->high = -INFINITY;
   for (uint32_t i = 0; i < femur->vertex_count; ++i) {
@@ -62,8 +50,8 @@ static void measure_extent(const sonde_mesh *femur, frame *f) {
 }
 
 // Mean of the femur's surface between two heights, by area.
-static bool slab_centre(const sonde_mesh *femur, const frame *f, double low, double high,
-                        sonde_vec3 *centre) {
+bool scan_slab_centre(const sonde_mesh *femur, const scan_frame *f, double low, double high,
+                      sonde_vec3 *centre) {
   SONDE_ASSERT(low <= high);
   double area = 0;
   sonde_vec3 sum = vec3(0, 0, 0);
@@ -82,11 +70,11 @@ static bool slab_centre(const sonde_mesh *femur, const frame *f, double low, dou
 }
 
 // How far the middle of an end stands beside the shaft's line.
-static sonde_vec3 end_offset(const sonde_mesh *femur, const frame *f, bool far) {
+static sonde_vec3 end_offset(const sonde_mesh *femur, const scan_frame *f, bool far) {
   double length = f->high - f->low;
   sonde_vec3 centre;
   double low = far ? f->high - HEAD * length : f->low, high = low + HEAD * length;
-  if (!slab_centre(femur, f, low, high, &centre)) return vec3(0, 0, 0);
+  if (!scan_slab_centre(femur, f, low, high, &centre)) return vec3(0, 0, 0);
   return across(v_sub(centre, f->origin), f->z);
 }
 
@@ -100,8 +88,8 @@ static const char *unit_hint(double length_m, double low, double high) {
 }
 
 // The patient's right, front and head side in the scan's coordinates; x and z of the leg in them.
-static void patient_axes(const sonde_leg_scan *scan, sonde_vec3 *medial, sonde_vec3 *front,
-                         sonde_vec3 *down) {
+void scan_patient_axes(const sonde_leg_scan *scan, sonde_vec3 *medial, sonde_vec3 *front,
+                       sonde_vec3 *down) {
   SONDE_ASSERT(scan->axes != SONDE_AXES_ANY);
   double sign = scan->axes == SONDE_AXES_RAS ? 1 : -1;
   *medial = vec3(scan->left ? sign : -sign, 0, 0);
@@ -109,7 +97,7 @@ static void patient_axes(const sonde_leg_scan *scan, sonde_vec3 *medial, sonde_v
   *down = vec3(0, 0, -1);
 }
 
-static sonde_status femur_frame(const sonde_leg_scan *scan, frame *f, sonde_error *error) {
+sonde_status scan_femur_frame(const sonde_leg_scan *scan, scan_frame *f, sonde_error *error) {
   // z runs along the straight line through the middles of the shaft's middle third.
   const sonde_mesh *femur = scan->femur;
   if (femur->vertex_count < 50 || femur->face_count < 50)
@@ -119,22 +107,22 @@ static sonde_status femur_frame(const sonde_leg_scan *scan, frame *f, sonde_erro
   f->z = vec3(0, 0, 1);
   f->z = wide_direction(femur, f, -INFINITY, INFINITY, false);
   for (int pass = 0; pass < 3; ++pass) {
-    measure_extent(femur, f);
+    scan_extent(femur, f);
     double long_m = f->high - f->low;
     sonde_vec3 a, b;
-    if (!slab_centre(femur, f, f->low + 0.3 * long_m, f->low + 0.4 * long_m, &a) ||
-        !slab_centre(femur, f, f->low + 0.6 * long_m, f->low + 0.7 * long_m, &b))
+    if (!scan_slab_centre(femur, f, f->low + 0.3 * long_m, f->low + 0.4 * long_m, &a) ||
+        !scan_slab_centre(femur, f, f->low + 0.6 * long_m, f->low + 0.7 * long_m, &b))
       return sonde_fail(error, SONDE_MESH, "the femur has no shaft");
     f->origin = a;
     f->z = v_unit(v_sub(b, a), f->z);
   }
-  measure_extent(femur, f);
+  scan_extent(femur, f);
   // The head stands beside the shaft, farther than the condyles do.
   sonde_vec3 head = end_offset(scan->femur, f, false), other = end_offset(scan->femur, f, true);
   if (v_norm(other) > v_norm(head)) {
     head = other;
     f->z = v_neg(f->z);
-    measure_extent(scan->femur, f);
+    scan_extent(scan->femur, f);
   }
   double length = f->high - f->low;
   if (!(v_norm(head) > LEAST_HEAD_M) || !(length > LEAST_FEMUR_M && length < MOST_FEMUR_M))
@@ -162,7 +150,7 @@ static sonde_status femur_frame(const sonde_leg_scan *scan, frame *f, sonde_erro
         -behind * 1e3, side, mirrored);
   if (scan->axes == SONDE_AXES_ANY) return SONDE_OK;
   sonde_vec3 medial, front, down;
-  patient_axes(scan, &medial, &front, &down);
+  scan_patient_axes(scan, &medial, &front, &down);
   const bool x = v_dot(f->x, medial) < -0.5, y = v_dot(f->y, front) < -0.5;
   const bool z = v_dot(f->z, down) < -0.5, ras = scan->axes == SONDE_AXES_RAS;
   if (!x && !y && !z) return SONDE_OK;
@@ -179,10 +167,11 @@ static sonde_status femur_frame(const sonde_leg_scan *scan, frame *f, sonde_erro
 }
 
 // Distance to the first hit from a point of the frame, NaN when there is none.
-static double cast(const sonde_surface_index *index, const frame *f, sonde_vec3 from, sonde_vec3 to,
-                   double reach) {
+double scan_cast(const sonde_surface_index *index, const scan_frame *f, sonde_vec3 from,
+                 sonde_vec3 to, double reach) {
   sonde_surface_point hit;
-  sonde_vec3 origin = to_scan(f, from), direction = v_sub(to_scan(f, v_add(from, to)), origin);
+  sonde_vec3 origin = scan_point(f, from),
+             direction = v_sub(scan_point(f, v_add(from, to)), origin);
   if (!sonde_surface_raycast(index, origin, direction, reach, &hit)) return NAN;
   return v_distance(hit.point_m, origin);
 }
@@ -201,28 +190,40 @@ static void fit_line(const sonde_vec3 *point, int count, sonde_vec3 *mean, sonde
   *slope = v_scale(*slope, 1 / weight);
 }
 
-// The straight line through the middles of the skin's sections.
-static void centre_line(const sonde_surface_index *skin, const frame *f, sonde_tube *tube) {
-  enum { ROWS = 21, RAYS = 72, PASSES = 4 };
-  sonde_vec3 middle[ROWS], mean, slope;
-  SONDE_ASSERT(tube->length_m > 0);
-  for (int n = 0; n < ROWS * PASSES; ++n) {
-    sonde_vec3 *m = &middle[n / PASSES];
-    if (n % PASSES == 0)
-      *m = vec3(0, 0, (0.02 + 0.96 * (n / PASSES) / (ROWS - 1)) * tube->length_m);
-    double area = 0, x = 0, y = 0, last = NAN, last_angle = 0;
-    for (int k = 0; k <= RAYS; ++k) {
-      double angle = 2 * SONDE_PI * k / RAYS;
-      double r = cast(skin, f, *m, vec3(cos(angle), sin(angle), 0), REACH_M);
-      if (isfinite(last) && isfinite(r)) { // triangle of the middle and two skin points
-        double part = 0.5 * last * r * sin(angle - last_angle);
-        area += part;
-        x += part * (last * cos(last_angle) + r * cos(angle)) / 3;
-        y += part * (last * sin(last_angle) + r * sin(angle)) / 3;
-      }
-      last = r, last_angle = angle;
+bool scan_section(const sonde_surface_index *skin, const scan_frame *f, sonde_vec3 *middle,
+                  double *girth_m) {
+  enum { RAYS = 72 };
+  double area = 0, x = 0, y = 0, last = NAN, last_angle = 0;
+  bool closed = true;
+  *girth_m = 0;
+  for (int k = 0; k <= RAYS; ++k) {
+    double angle = 2 * SONDE_PI * k / RAYS;
+    double r = scan_cast(skin, f, *middle, vec3(cos(angle), sin(angle), 0), REACH_M);
+    closed &= isfinite(r);
+    if (isfinite(last) && isfinite(r)) { // triangle of the middle and two skin points
+      double ax = last * cos(last_angle), ay = last * sin(last_angle);
+      double bx = r * cos(angle), by = r * sin(angle);
+      double part = 0.5 * last * r * sin(angle - last_angle);
+      area += part;
+      x += part * (ax + bx) / 3;
+      y += part * (ay + by) / 3;
+      *girth_m += hypot(bx - ax, by - ay);
     }
-    if (area > 0) *m = v_add(*m, vec3(x / area, y / area, 0));
+    last = r, last_angle = angle;
+  }
+  if (area > 0) *middle = v_add(*middle, vec3(x / area, y / area, 0));
+  return closed;
+}
+
+// The straight line through the middles of the skin's sections.
+static void centre_line(const sonde_surface_index *skin, const scan_frame *f, sonde_tube *tube) {
+  enum { ROWS = 21, PASSES = 4 };
+  sonde_vec3 middle[ROWS], mean, slope;
+  double girth_m;
+  SONDE_ASSERT(tube->length_m > 0);
+  for (int n = 0; n < ROWS; ++n) {
+    middle[n] = vec3(0, 0, (0.02 + 0.96 * n / (ROWS - 1)) * tube->length_m);
+    for (int pass = 0; pass < PASSES; ++pass) scan_section(skin, f, &middle[n], &girth_m);
   }
   fit_line(middle, ROWS, &mean, &slope);
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
@@ -233,28 +234,28 @@ static void centre_line(const sonde_surface_index *skin, const frame *f, sonde_t
 }
 
 // Turns the frame until z runs along a direction of the frame, and moves its origin.
-static void turn(frame *f, sonde_vec3 along, sonde_vec3 origin) {
+static void turn(scan_frame *f, sonde_vec3 along, sonde_vec3 origin) {
   sonde_vec3 z = v_unit(along, vec3(0, 0, 1));
   sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
-  frame old = *f;
-  f->origin = to_scan(&old, origin);
-  f->x = v_sub(to_scan(&old, x), old.origin);
-  f->y = v_sub(to_scan(&old, y), old.origin);
-  f->z = v_sub(to_scan(&old, z), old.origin);
+  scan_frame old = *f;
+  f->origin = scan_point(&old, origin);
+  f->x = v_sub(scan_point(&old, x), old.origin);
+  f->y = v_sub(scan_point(&old, y), old.origin);
+  f->z = v_sub(scan_point(&old, z), old.origin);
 }
 
 // Frame and length of a thigh that begins at the upper end of the skin.
 static sonde_status skin_frame(const sonde_leg_scan *scan, const sonde_surface_index *index,
-                               const sonde_thigh *thigh, sonde_tube *tube, frame *f,
+                               const sonde_thigh *thigh, sonde_tube *tube, scan_frame *f,
                                sonde_error *error) {
   if (scan->axes == SONDE_AXES_ANY)
     return sonde_fail(
         error, SONDE_ARGUMENT,
         "without a femur the axes of the skin's coordinates must be known, expected RAS "
         "or LPS");
-  patient_axes(scan, &f->x, &f->y, &f->z);
+  scan_patient_axes(scan, &f->x, &f->y, &f->z);
   f->origin = scan->skin->vertices[0];
-  measure_extent(scan->skin, f);
+  scan_extent(scan->skin, f);
   double high = f->high - f->low;
   if (!(high >= LEAST_SKIN_M && high <= MOST_SKIN_M))
     return sonde_fail(error, SONDE_MESH, "the skin is %.3g mm high, expected %.0f to %.0f%s",
@@ -287,9 +288,9 @@ static sonde_status skin_frame(const sonde_leg_scan *scan, const sonde_surface_i
 
     // The upper end of a leg that leans slants: it begins as far above the end of the axis on one
     // side as it ends below it on the other. An open end is taken to lie across the patient.
-    measure_extent(scan->skin, f);
+    scan_extent(scan->skin, f);
     double slant = v_norm(across(upright, f->z)) * WIDEST_LEG_M;
-    double up = cast(index, f, vec3(0, 0, 0.5 * length), vec3(0, 0, -1), high);
+    double up = scan_cast(index, f, vec3(0, 0, 0.5 * length), vec3(0, 0, -1), high);
     if (isfinite(up)) slant = fmin(slant, 0.5 * length - up - f->low);
     double start = f->low + 2 * fmax(slant, 0) + UPPER_END_M;
     f->origin = v_madd(f->origin, start, f->z);
@@ -305,13 +306,13 @@ static sonde_status skin_frame(const sonde_leg_scan *scan, const sonde_surface_i
 enum { KNOTS = 5 };
 
 // The bone's middle at some heights, by the surface within 8 mm; straight in between and beyond.
-static void bone_line(const sonde_mesh *femur, const frame *f, double length,
+static void bone_line(const sonde_mesh *femur, const scan_frame *f, double length,
                       sonde_vec3 knot[KNOTS]) {
   for (int k = 0; k < KNOTS; ++k) {
     double z = (0.15 + 0.2 * k) * length;
-    if (!slab_centre(femur, f, z - 0.008, z + 0.008, &knot[k]))
-      knot[k] = k > 0 ? to_scan(f, knot[k - 1]) : f->origin;
-    knot[k] = to_frame(f, knot[k]);
+    if (!scan_slab_centre(femur, f, z - 0.008, z + 0.008, &knot[k]))
+      knot[k] = k > 0 ? scan_point(f, knot[k - 1]) : f->origin;
+    knot[k] = scan_local(f, knot[k]);
     knot[k].z = z;
   }
 }
@@ -380,7 +381,7 @@ static int by_size(const void *a, const void *b) {
 
 // Rays come from outside; head, neck and trochanter are held within 1.6 times the shaft's radius.
 static void sample_femur(const sonde_leg_scan *scan, const sonde_surface_index *bone,
-                         const frame *f, sonde_tube *tube) {
+                         const scan_frame *f, sonde_tube *tube) {
   sonde_vec3 knot[KNOTS];
   bone_line(scan->femur, f, tube->length_m, knot);
   for (uint32_t j = 0; j < SONDE_TUBE_ROWS; ++j) {
@@ -393,7 +394,7 @@ static void sample_femur(const sonde_leg_scan *scan, const sonde_surface_index *
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
       sonde_vec3 out = vec3(cos(tube_angle(i)), sin(tube_angle(i)), 0);
       sonde_vec3 from = v_madd(vec3(middle.x, middle.y, z), BONE_REACH_M, out);
-      tube->radius_m[j][i] = BONE_REACH_M - cast(bone, f, from, v_neg(out), BONE_REACH_M);
+      tube->radius_m[j][i] = BONE_REACH_M - scan_cast(bone, f, from, v_neg(out), BONE_REACH_M);
     }
   }
   fill_table(tube->radius_m);
@@ -416,7 +417,7 @@ typedef struct indices {
 
 // A vessel's part below the fascia at some heights: middle, and the diameter of the round tube that
 // has its area. False when there is none.
-static bool measure_vessel(const sonde_mesh *vessel, const frame *f, const sonde_thigh *thigh,
+static bool measure_vessel(const sonde_mesh *vessel, const scan_frame *f, const sonde_thigh *thigh,
                            const sonde_thigh_shape *shape, double low, double high,
                            sonde_vec3 *middle, double *diameter_m) {
   SONDE_ASSERT(low < high);
@@ -425,7 +426,7 @@ static bool measure_vessel(const sonde_mesh *vessel, const frame *f, const sonde
   for (uint32_t k = 0; vessel && k < vessel->face_count; ++k) {
     sonde_vec3 p[3], centre = vec3(0, 0, 0);
     for (int c = 0; c < 3; ++c) {
-      p[c] = to_frame(f, vessel->vertices[vessel->faces[k][c]]);
+      p[c] = scan_local(f, vessel->vertices[vessel->faces[k][c]]);
       centre = v_madd(centre, 1.0 / 3, p[c]);
     }
     if (centre.z < low || centre.z > high) continue;
@@ -441,7 +442,7 @@ static bool measure_vessel(const sonde_mesh *vessel, const frame *f, const sonde
 }
 
 // The scan's own measures replace the parameters.
-static void measure(const sonde_leg_scan *scan, const frame *f, sonde_thigh_shape *shape,
+static void measure(const sonde_leg_scan *scan, const scan_frame *f, sonde_thigh_shape *shape,
                     sonde_thigh *thigh, sonde_leg_report *report) {
   const sonde_tube *skin = &shape->skin;
   const double length = skin->length_m, half = 0.5 * length;
@@ -490,9 +491,9 @@ static void measure(const sonde_leg_scan *scan, const frame *f, sonde_thigh_shap
 
 static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_thigh *thigh,
                            sonde_thigh_shape *shape, sonde_leg_report *report, sonde_error *error) {
-  frame f = {0};
+  scan_frame f = {0};
   sonde_tube *skin = &shape->skin;
-  sonde_status status = scan->femur ? femur_frame(scan, &f, error)
+  sonde_status status = scan->femur ? scan_femur_frame(scan, &f, error)
                                     : skin_frame(scan, in->skin, thigh, skin, &f, error);
   if (status) return status;
   if (scan->femur) {
@@ -516,7 +517,7 @@ static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_
     for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
       double angle = tube_angle(i), z = row_height(skin->length_m, j);
       sonde_vec3 middle = vec3(skin->x_m[j], skin->y_m[j], z);
-      double r = cast(in->skin, &f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
+      double r = scan_cast(in->skin, &f, middle, vec3(cos(angle), sin(angle), 0), REACH_M);
       skin->radius_m[j][i] = r;
       report->rays++;
       if (!isfinite(r)) report->missed++;
@@ -539,7 +540,7 @@ static sonde_status sample(const sonde_leg_scan *scan, const indices *in, sonde_
       for (uint32_t i = 0; i < SONDE_TUBE_COLUMNS; ++i) {
         double angle = tube_angle(i), z = row_height(length, j);
         sonde_vec3 inward = v_neg(sonde_tube_normal(skin, angle, z));
-        double depth = cast(in->muscle, &f, sonde_tube_point(skin, angle, z), inward, 0.06);
+        double depth = scan_cast(in->muscle, &f, sonde_tube_point(skin, angle, z), inward, 0.06);
         shape->fat_m[j][i] = isfinite(depth) ? fmax(depth - thigh->skin_m, 0.002) : NAN;
       }
     fill_table(shape->fat_m);

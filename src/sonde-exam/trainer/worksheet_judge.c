@@ -27,10 +27,6 @@ const char *sonde_sheet_outcome_name(sonde_sheet_outcome outcome) {
 
 // ---- the truth of a place
 
-static bool is_clot(sonde_sheet_finding finding) {
-  return finding == SONDE_SHEET_PARTLY || finding == SONDE_SHEET_NOT_COMPRESSIBLE;
-}
-
 // What the plane of a place shows of one vein, given by its points from proximal to distal: each
 // crossing in the picture that lies in the clot, or within reach of its end.
 static void look_at_vein(const sonde_plan_point *place, double reach_m, const sonde_pathology *clot,
@@ -217,7 +213,8 @@ void sonde_worksheet_judge(const sonde_worksheet *sheet, const sonde_case *patie
   for (uint32_t i = 0; i < plan->count; ++i) {
     sonde_sheet_place_verdict *place = &v->place[i];
     const sonde_sheet_row *row = &sheet->row[i];
-    const bool called = is_clot(row->finding);
+    const bool called =
+        row->finding == SONDE_SHEET_PARTLY || row->finding == SONDE_SHEET_NOT_COMPRESSIBLE;
     find_truth(setups, plan, i, place);
     judge_pictures(sheet, plan, i, place);
     const bool agree = place->edge || called == place->clot;

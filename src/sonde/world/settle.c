@@ -65,12 +65,6 @@ static balance evaluate(const problem *p) {
   return at;
 }
 
-static balance evaluate_all(const problem *p) {
-  memset(p->body->common.is_awake, 1, p->body->common.batch_count);
-  sonde_batches_list(p->body, p->body->common.is_awake);
-  return evaluate(p);
-}
-
 // Lists the rows that move: displaced ones, those whose forces are out of balance by more than
 // their share of `residual_n`, and what is around them. Of a volumetric body all move, since its
 // inside hands forces on at once.
@@ -196,7 +190,9 @@ static sonde_settle_result iterate(problem *p, double relative, uint32_t limit) 
     if (joined > 0) list_around(body, joined), now = evaluate(p);
     const double goal = fmax(0.5 * relative * now.load, least_n);
     if (now.residual <= goal || result.iterations >= limit) {
-      now = evaluate_all(p);
+      memset(p->body->common.is_awake, 1, p->body->common.batch_count);
+      sonde_batches_list(p->body, p->body->common.is_awake);
+      now = evaluate(p); // of all rows
       result.converged = now.residual <= fmax(relative * now.load, least_n);
       if (result.converged || result.iterations >= limit) break;
       choose(p, goal);
