@@ -1,6 +1,7 @@
 // Token, document keys and handshake: see page_secret.h.
 #include "stream/page_secret.h"
 
+#include "files/png.h"
 #include "sonde/stream.h"
 
 #include <errno.h>
@@ -34,19 +35,12 @@ void page_hmac_sha1(const char *key, const char *text, unsigned char digest[PAGE
 
 void page_accept_key(const char *key, char accept[PAGE_ACCEPT_TEXT]) {
   static const char GUID[] = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
-  static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   char text[64 + sizeof GUID];
-  unsigned char digest[PAGE_SHA1_BYTES + 1] = {0}; // a zero completes the last three bytes
+  unsigned char digest[PAGE_SHA1_BYTES];
   SONDE_ASSERT(strlen(key) <= 64);
   int size = snprintf(text, sizeof text, "%s%s", key, GUID);
   page_sha1(text, (size_t)size, digest);
-  for (size_t i = 0; i < 7; ++i) {
-    const unsigned char *d = digest + 3 * i;
-    uint32_t bits = (uint32_t)d[0] << 16 | (uint32_t)d[1] << 8 | d[2];
-    for (size_t k = 0; k < 4; ++k) accept[4 * i + k] = DIGITS[bits >> (18 - 6 * k) & 63];
-  }
-  accept[27] = '='; // of the last three bytes two are the digest's
-  accept[28] = 0;
+  sonde_base64_write(digest, sizeof digest, accept);
 }
 
 static void write_digits(const unsigned char *bytes, char text[PAGE_SECRET_TEXT]) {

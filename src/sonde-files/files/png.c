@@ -38,12 +38,11 @@ sonde_status sonde_image_save_png(const sonde_image *image, const char *path, so
   return status;
 }
 
-char *sonde_base64_encode(const uint8_t *bytes, size_t count) {
+void sonde_base64_write(const uint8_t *bytes, size_t count, char *text) {
   static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  char *text = SONDE_NEW(char, (count + 2) / 3 * 4 + 1);
-  SONDE_ASSERT(bytes || count == 0);
+  SONDE_ASSERT(text && (bytes || count == 0));
   size_t used = 0;
-  for (size_t i = 0; text && i < count; i += 3) {
+  for (size_t i = 0; i < count; i += 3) {
     uint32_t group = (uint32_t)bytes[i] << 16;
     if (i + 1 < count) group |= (uint32_t)bytes[i + 1] << 8;
     if (i + 2 < count) group |= bytes[i + 2];
@@ -52,6 +51,11 @@ char *sonde_base64_encode(const uint8_t *bytes, size_t count) {
     text[used++] = i + 1 < count ? DIGITS[group >> 6 & 63] : '=';
     text[used++] = i + 2 < count ? DIGITS[group & 63] : '=';
   }
-  SONDE_ASSERT(!text || used == (count + 2) / 3 * 4);
+  text[used] = 0;
+}
+
+char *sonde_base64_encode(const uint8_t *bytes, size_t count) {
+  char *text = SONDE_NEW(char, SONDE_BASE64_TEXT(count));
+  if (text) sonde_base64_write(bytes, count, text);
   return text;
 }

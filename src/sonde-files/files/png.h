@@ -20,7 +20,11 @@ SONDE_LINK sonde_status sonde_svg_put_colours(sonde_file *file, double x, double
                                               double height, const sonde_colours *picture,
                                               sonde_error *error);
 
-// Bytes as text (RFC 4648, section 4). @return freed by sonde_free(); NULL: out of memory
+// Characters of `count` bytes in base64, with the end.
+#define SONDE_BASE64_TEXT(count) (((count) + 2) / 3 * 4 + 1)
+// Writes bytes as text (RFC 4648, section 4). @param[out] text [SONDE_BASE64_TEXT(count)]
+SONDE_LINK void sonde_base64_write(const uint8_t *bytes, size_t count, char *text);
+// The same in memory of its own. @return freed by sonde_free(); NULL: out of memory
 SONDE_LINK char *sonde_base64_encode(const uint8_t *bytes, size_t count);
 
 #endif
