@@ -41,6 +41,7 @@
 #include "sonde/files.h"
 #include "sonde/files_scanner.h"
 #include "sonde/solid.h"
+#include "sonde/solid_live.h"
 #include "sonde/flow.h"
 #include "sonde/flow_colour.h"
 #include "sonde/flow_gate.h"

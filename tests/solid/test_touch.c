@@ -49,14 +49,14 @@ static void depth_is_the_distance_to_the_surface(void **state) {
     p.y *= 0.3, p.z = 0.25 * p.z - 5e-3;
     double depth = 0;
     sonde_mat3 bend;
-    bool in = sonde_touch_depth(&box.touch, p, &depth, &out, &bend);
+    bool in = sonde_touch_depth(&box.touch, p, 0, &depth, &out, &bend);
     double want = box_depth(p, 30e-3, 6e-3, 3e-3);
     if (fabs(want) < 1e-9) continue;
     assert_int_equal(in, want > 0);
     inside += in;
     if (in) assert_near(depth, want, 1e-12);
     if (in) assert_near(v_norm(out), 1, 1e-12);
-    in = sonde_touch_depth(&ball.touch, p, &depth, &out, &bend);
+    in = sonde_touch_depth(&ball.touch, p, 0, &depth, &out, &bend);
     want = 15e-3 - v_norm(vec3(p.x, p.y, p.z + 15e-3));
     assert_int_equal(in, want > 0);
     if (in) assert_near(depth, want, 1e-12);
@@ -78,11 +78,11 @@ static void a_containing_probe_is_never_shallower(void **state) {
     p.y *= 0.3, p.z = 0.3 * p.z - 5e-3;
     double a = 0, b = 0;
     sonde_mat3 bend;
-    if (!sonde_touch_depth(&small.touch, p, &a, &out, &bend)) continue;
-    assert_true(sonde_touch_depth(&wide.touch, p, &b, &out, &bend));
+    if (!sonde_touch_depth(&small.touch, p, 0, &a, &out, &bend)) continue;
+    assert_true(sonde_touch_depth(&wide.touch, p, 0, &b, &out, &bend));
     assert_true(b >= a - 1e-15);
     double c = 0;
-    (void)sonde_touch_depth(&round.touch, p, &c, &out, &bend);
+    (void)sonde_touch_depth(&round.touch, p, 0, &c, &out, &bend);
     assert_true(c >= a - 1e-15);
   }
   drop(&small);

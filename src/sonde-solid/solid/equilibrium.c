@@ -60,7 +60,7 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
   sonde_equilibrium *e = *equilibrium = SONDE_NEW(sonde_equilibrium, 1);
   if (!e) return sonde_fail_memory(error);
   e->mesh = mesh, e->def = *def;
-  const uint32_t nodes = mesh->node_count;
+  const uint32_t nodes = mesh->node_count, *lines = mesh->lines, sheet = lines[1] * lines[2];
   e->unknown = SONDE_NEW(uint32_t, nodes);
   e->zone_node = SONDE_NEW(uint32_t, nodes);
   e->face = SONDE_NEW(uint32_t, mesh->face_count);
@@ -71,13 +71,14 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
   sonde_status status = sonde_fail_memory(error);
   if (!e->unknown || !e->zone_node || !e->face || !e->corner || !e->moved || !e->trial || !e->kept)
     goto done;
-  // Unknowns, those of the zone last; faces, those of the zone first.
-  for (int zone = 0; zone < 2; ++zone)
+  // Unknowns, those of the patch and the zone last; faces, those of the zone first.
+  for (int part = 0; part < 3; ++part)
     for (uint32_t n = 0; n < nodes; ++n) {
-      if (zone == 0) e->unknown[n] = SONDE_HELD_CORNER;
-      if (mesh->held[n] == 7 || (in_zone[n] != 0) != zone) continue;
-      if (zone) e->zone_node[e->zone_count++] = n;
-      e->unknown[n] = e->unknown_count++;
+      if (part == 0) e->unknown[n] = SONDE_HELD_CORNER;
+      if (mesh->held[n] == 7 || in_zone[n] != (part == 2 ? SONDE_IN_ZONE : part * SONDE_IN_PATCH))
+        continue;
+      if (part == 2) e->zone_node[e->zone_count++] = n;
+      e->patch_count += part == 1, e->unknown[n] = e->unknown_count++;
     }
   for (uint32_t h = 0; h < mesh->count; ++h)
     for (int c = 0; c < 8; ++c) e->corner[h][c] = e->unknown[mesh->corner[h][c]];
@@ -93,7 +94,7 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
     else
       e->face[--others] = f;
   }
-  if (e->zone_count == 0 || sonde_zone_first(e) == 0) {
+  if (e->zone_count == 0 || sonde_patch_first(e) == 0) {
     status = sonde_fail(error, SONDE_ARGUMENT,
                         "%u of %u nodes may touch: expected some, and some that do not",
                         e->zone_count, e->unknown_count);
@@ -112,13 +113,12 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
   sonde_vec3 *points = SONDE_NEW(sonde_vec3, e->unknown_count);
   if (all && e->imposed && e->target && points) {
     // Of a grid the lines are what cuts it well: near the probe they lie close together.
-    const uint32_t *lines = mesh->lines, sheet = lines[1] * lines[2];
     for (uint32_t n = 0; n < nodes; ++n)
       if (e->unknown[n] != SONDE_HELD_CORNER)
         points[e->unknown[n]] =
             sheet ? vec3(n / sheet, n / lines[2] % lines[1], n % lines[2]) : mesh->node[n];
     const sonde_symbolic_def how = {.node_count = e->unknown_count,
-                                    .last_count = e->zone_count,
+                                    .last_count = e->patch_count + e->zone_count,
                                     .block = 3,
                                     .points = points,
                                     .element_count = mesh->count,
@@ -147,28 +147,48 @@ void sonde_equilibrium_destroy(sonde_equilibrium *e) {
   sonde_free(e);
 }
 
+// Whether a point of the probe's frame lies this far around the footprint, near the skin.
+static bool is_beside(const sonde_probe *probe, double reach, sonde_vec3 p) {
+  const bool ball = probe->ball_radius_m > 0;
+  const double half_x = ball ? fmin(probe->ball_radius_m, widest_ball_m) : probe->half_x_m;
+  const double half_y = ball ? half_x : probe->half_y_m;
+  return fabs(p.x) < half_x + reach && fabs(p.y) < half_y + reach && fabs(p.z) < skin_below_m;
+}
+
 sonde_status sonde_equilibrium_create(const sonde_hexes *mesh, const sonde_probe *probe,
                                       sonde_pose start, const sonde_equilibrium_def *def,
                                       sonde_equilibrium **equilibrium, sonde_error *error) {
+  return sonde_equilibrium_place(mesh, probe, start, def, 0, equilibrium, error);
+}
+
+sonde_status sonde_equilibrium_place(const sonde_hexes *mesh, const sonde_probe *probe,
+                                     sonde_pose start, const sonde_equilibrium_def *def,
+                                     double patch_m, sonde_equilibrium **equilibrium,
+                                     sonde_error *error) {
   SONDE_ASSERT(mesh != NULL && probe != NULL && equilibrium != NULL);
   *equilibrium = NULL;
   sonde_status status = check(def, error);
   if (status) return status;
   const bool ball = probe->ball_radius_m > 0;
-  const double half_x = ball ? fmin(probe->ball_radius_m, widest_ball_m) : probe->half_x_m;
-  const double half_y = ball ? half_x : probe->half_y_m;
   // Lines of nodes along the footprint's border belong to it, though the skin's curvature moves
   // them.
-  const double slack = 0.15 * fmin(half_x, half_y);
+  const double slack = 0.15 * (ball ? fmin(probe->ball_radius_m, widest_ball_m)
+                                    : fmin(probe->half_x_m, probe->half_y_m));
   const double reach = def->bonded ? slack : def->rounding_m + def->zone_m;
   uint8_t *in_zone = SONDE_NEW(uint8_t, mesh->node_count);
   if (!in_zone) return sonde_fail_memory(error);
+  for (uint32_t h = 0; h < mesh->count && patch_m > 0; ++h) {
+    sonde_vec3 middle = vec3(0, 0, 0);
+    for (int c = 0; c < 8; ++c) middle = v_madd(middle, 0.125, mesh->node[mesh->corner[h][c]]);
+    if (mesh->layer[h] == SONDE_SOLID_SKIN &&
+        is_beside(probe, patch_m, pose_apply_inverse(start, middle)))
+      for (int c = 0; c < 8; ++c) in_zone[mesh->corner[h][c]] = SONDE_IN_PATCH;
+  }
   for (uint32_t f = 0; f < mesh->face_count; ++f)
     for (int c = 0; c < 4; ++c) {
       const uint32_t n = mesh->face[f][c];
-      const sonde_vec3 p = pose_apply_inverse(start, mesh->node[n]);
-      in_zone[n] = fabs(p.x) < half_x + reach && fabs(p.y) < half_y + reach && p.z < skin_below_m &&
-                   p.z > -skin_below_m;
+      if (is_beside(probe, reach, pose_apply_inverse(start, mesh->node[n])))
+        in_zone[n] = SONDE_IN_ZONE;
     }
   status = sonde_equilibrium_make(mesh, in_zone, def, equilibrium, error);
   sonde_free(in_zone);
@@ -177,7 +197,7 @@ sonde_status sonde_equilibrium_create(const sonde_hexes *mesh, const sonde_probe
   e->shape = (sonde_touch_shape){.probe = probe, .rounding_m = def->rounding_m};
   e->start = e->pose = start;
   for (uint32_t k = 0; k < e->zone_count; ++k) e->imposed[k] = def->bonded;
-  if (!ball && def->rounding_m > 0)
+  if (!ball && (def->rounding_m > 0 || patch_m > 0))
     status = sonde_surface_index_create(&probe->body.hull, &e->shape.hull, error);
   if (!status) return SONDE_OK;
   sonde_equilibrium_destroy(e);
@@ -187,12 +207,16 @@ sonde_status sonde_equilibrium_create(const sonde_hexes *mesh, const sonde_probe
 
 // ---- the probe's way ------------------------------------------------------------------------
 
+double sonde_equilibrium_way(sonde_pose from, sonde_pose to) {
+  const double turn = sonde_quat_angle(from.rotation, to.rotation);
+  return v_distance(from.position, to.position) + turn_radius_m * turn;
+}
+
 sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
                                     sonde_equilibrium_result *result, sonde_error *error) {
   SONDE_ASSERT(e != NULL && result != NULL);
   const sonde_pose from = e->pose;
-  const double turn = sonde_quat_angle(from.rotation, pose.rotation);
-  const double way = v_distance(from.position, pose.position) + turn_radius_m * turn;
+  const double way = sonde_equilibrium_way(from, pose);
   if (!isfinite(way)) return sonde_fail(error, SONDE_ARGUMENT, "the probe's pose is not finite");
   const size_t bytes = e->mesh->node_count * sizeof *e->moved;
   sonde_vec3 *begin = SONDE_NEW(sonde_vec3, e->mesh->node_count);

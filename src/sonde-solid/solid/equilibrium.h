@@ -10,8 +10,9 @@ struct sonde_equilibrium {
   sonde_equilibrium_def def;
   sonde_touch_shape shape;
   sonde_pose start, pose; // where the skin is at rest; where the state is in equilibrium
-  // Unknowns: free nodes, then those of the zone, whose skin may touch.
-  uint32_t unknown_count, zone_count;
+  // Unknowns: free nodes, those of the patch, then those of the zone, whose skin may touch. The
+  // factor condenses on the patch, which a live solid has, and the zone.
+  uint32_t unknown_count, zone_count, patch_count;
   uint32_t *unknown;     // [node_count] SONDE_HELD_CORNER: the node is held
   uint32_t (*corner)[8]; // [hexes] unknowns
   uint32_t *zone_node;   // [zone_count]
@@ -32,14 +33,41 @@ struct sonde_equilibrium {
 static inline uint32_t sonde_zone_first(const sonde_equilibrium *e) {
   return e->unknown_count - e->zone_count;
 }
+static inline uint32_t sonde_patch_first(const sonde_equilibrium *e) {
+  return sonde_zone_first(e) - e->patch_count;
+}
 
-// Makes the equilibrium of these nodes: in_zone [node_count]. Nothing is imposed.
+enum { SONDE_IN_ZONE = 1, SONDE_IN_PATCH = 2 };
+// Makes the equilibrium of these nodes: in_zone [node_count], others 0. Nothing is imposed.
 sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_zone,
                                     const sonde_equilibrium_def *def,
                                     sonde_equilibrium **equilibrium, sonde_error *error);
-// Strain energy and forces [3 unknown_count] at displacements u. @return false: turned inside out
-bool sonde_equilibrium_forces(const sonde_equilibrium *e, const sonde_vec3 *u, double *energy_j,
-                              double *force);
+// As sonde_equilibrium_create(), with a patch of the skin's hexahedra within patch_m of the
+// footprint; 0: none.
+sonde_status sonde_equilibrium_place(const sonde_hexes *mesh, const sonde_probe *probe,
+                                     sonde_pose start, const sonde_equilibrium_def *def,
+                                     double patch_m, sonde_equilibrium **equilibrium,
+                                     sonde_error *error);
+// Way of the probe from pose to pose, m: of its origin, and of its surface for turns.
+double sonde_equilibrium_way(sonde_pose from, sonde_pose to);
+// Adds strain energy and forces [3 unknown_count] of some hexahedra (NULL: the first `count`) at
+// displacements u. @return false: turned inside out
+bool sonde_equilibrium_add_forces(const sonde_equilibrium *e, const uint32_t *hexes, uint32_t count,
+                                  const sonde_vec3 *u, double *energy_j, double *force);
+// Stiffness of a hexahedron at displacements u, with `shift` of its mean diagonal added to the
+// diagonal and nothing between held coordinates and others.
+void sonde_equilibrium_stiffness(const sonde_equilibrium *e, const sonde_vec3 *u, double shift,
+                                 uint32_t hex, double (*k)[24]);
+// Contact of the zone at displacements u and ways v of its nodes (NULL: none): energy and sums,
+// forces f[side] on the nodes; the stiffness is added to `matrix` unless that is NULL, with or
+// without what the probe's bending takes away.
+sonde_touch sonde_equilibrium_touch(const sonde_equilibrium *e, sonde_pose pose,
+                                    const sonde_vec3 *u, const double *v, bool bend, double *f,
+                                    double *matrix);
+// Ways of the zone's nodes that balance the condensed solid (schur, load) and the contact: e->way.
+// A probe that is moving to the pose takes the skin with it first. Returns the number of steps; 0:
+// the condensed stiffness is not positive definite.
+uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool moving);
 // Corners of a face of the skin at displacements u.
 void sonde_equilibrium_face(const sonde_equilibrium *e, const sonde_vec3 *u, uint32_t face,
                             sonde_vec3 rest[4], sonde_vec3 now[4]);

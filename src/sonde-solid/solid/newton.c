@@ -37,12 +37,11 @@ static const sonde_hyperelastic *corners_of(const sonde_equilibrium *e, const so
   return &e->def.layer[e->mesh->layer[hex]];
 }
 
-bool sonde_equilibrium_forces(const sonde_equilibrium *e, const sonde_vec3 *u, double *energy_j,
-                              double *force) {
+bool sonde_equilibrium_add_forces(const sonde_equilibrium *e, const uint32_t *hexes, uint32_t count,
+                                  const sonde_vec3 *u, double *energy_j, double *force) {
   SONDE_ASSERT(u != NULL && energy_j != NULL && force != NULL);
-  *energy_j = 0;
-  memset(force, 0, 3 * (size_t)e->unknown_count * sizeof *force);
-  for (uint32_t h = 0; h < e->mesh->count; ++h) {
+  for (uint32_t n = 0; n < count; ++n) {
+    const uint32_t h = hexes ? hexes[n] : n;
     sonde_vec3 rest[8], now[8];
     double part, f[24];
     const sonde_hyperelastic *material = corners_of(e, u, h, rest, now);
@@ -58,19 +57,24 @@ bool sonde_equilibrium_forces(const sonde_equilibrium *e, const sonde_vec3 *u, d
   return true;
 }
 
-// Stiffness of an element at the state, for a sonde_matrix_source.
-static void stiffness_of(const void *user, uint32_t hex, double (*k)[24]) {
-  const sonde_equilibrium *e = user;
+void sonde_equilibrium_stiffness(const sonde_equilibrium *e, const sonde_vec3 *u, double shift,
+                                 uint32_t hex, double (*k)[24]) {
   sonde_vec3 rest[8], now[8];
   double energy, f[24], trace = 0;
-  const sonde_hyperelastic *material = corners_of(e, e->moved, hex, rest, now);
+  const sonde_hyperelastic *material = corners_of(e, u, hex, rest, now);
   bool whole = sonde_hex_evaluate(material, rest, now, &energy, f, k);
   SONDE_ASSERT(whole); // the state's energy was finite
   for (int i = 0; i < 24; ++i) trace += k[i][i];
-  for (int i = 0; i < 24; ++i) k[i][i] += e->shift * trace / 24;
+  for (int i = 0; i < 24; ++i) k[i][i] += shift * trace / 24;
   for (int row = 0; row < 24; ++row)
     for (int i = 0; i < 24 && (e->mesh->held[e->mesh->corner[hex][row / 3]] >> row % 3 & 1); ++i)
       if (i != row) k[row][i] = k[i][row] = 0;
+}
+
+// At the state, for a sonde_matrix_source.
+static void stiffness_of(const void *user, uint32_t hex, double (*k)[24]) {
+  const sonde_equilibrium *e = user;
+  sonde_equilibrium_stiffness(e, e->moved, e->shift, hex, k);
 }
 
 // The stiffness at the state with this shift, condensed on the zone: e->schur.
@@ -99,10 +103,9 @@ void sonde_equilibrium_face(const sonde_equilibrium *e, const sonde_vec3 *u, uin
   }
 }
 
-// Contact of the zone at the state and ways v of its nodes (NULL: none): energy and sums, forces
-// f[side] on the nodes; the stiffness is added to `matrix` unless that is NULL.
-static sonde_touch touch_zone(const sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u,
-                              const double *v, bool bend, double *f, double *matrix) {
+sonde_touch sonde_equilibrium_touch(const sonde_equilibrium *e, sonde_pose pose,
+                                    const sonde_vec3 *u, const double *v, bool bend, double *f,
+                                    double *matrix) {
   const size_t side = 3 * (size_t)e->zone_count;
   const uint32_t first = sonde_zone_first(e);
   sonde_touch sum = {0};
@@ -144,9 +147,7 @@ static double residual_of(sonde_equilibrium *e, const double *v, const double *t
   return energy;
 }
 
-// Ways of the zone's nodes that balance the condensed solid and the contact: e->way. Returns the
-// number of steps; 0: the condensed stiffness is not positive definite.
-static uint32_t solve_contact(sonde_equilibrium *e, sonde_pose pose, bool moving) {
+uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool moving) {
   const size_t side = 3 * (size_t)e->zone_count;
   // First guess: imposed nodes go to their targets. When the probe has just moved, the skin that it
   // would contain moves with it: left where it is, skin near an edge would be nearer to the probe's
@@ -170,7 +171,7 @@ static uint32_t solve_contact(sonde_equilibrium *e, sonde_pose pose, bool moving
       way[0] = with.x - now[c].x, way[1] = with.y - now[c].y, way[2] = with.z - now[c].z;
     }
   }
-  sonde_touch sum = touch_zone(e, pose, e->moved, e->way, false, e->touch, NULL);
+  sonde_touch sum = sonde_equilibrium_touch(e, pose, e->moved, e->way, false, e->touch, NULL);
   double energy = residual_of(e, e->way, e->touch) + sum.energy_j;
   for (uint32_t n = 1; n <= INNER_MOST; ++n) {
     const double size = norm(e->right, side), scale = norm(e->touch, side) + norm(e->load, side);
@@ -182,7 +183,7 @@ static uint32_t solve_contact(sonde_equilibrium *e, sonde_pose pose, bool moving
     bool definite = false;
     for (int bend = 1; bend >= 0 && !definite; --bend) {
       memcpy(e->matrix, e->schur, side * side * sizeof *e->matrix);
-      (void)touch_zone(e, pose, e->moved, e->way, bend, e->touch_trial, e->matrix);
+      (void)sonde_equilibrium_touch(e, pose, e->moved, e->way, bend, e->touch_trial, e->matrix);
       for (size_t i = 0; i < side; ++i) {
         if (!e->imposed[i / 3]) continue;
         for (size_t j = 0; j < side; ++j) e->matrix[i * side + j] = e->matrix[j * side + i] = 0;
@@ -196,7 +197,7 @@ static uint32_t solve_contact(sonde_equilibrium *e, sonde_pose pose, bool moving
     memcpy(way, e->right, side * sizeof *way);
     for (int half = 0; half < HALVINGS; ++half, share *= 0.5) {
       for (size_t i = 0; i < side; ++i) at[i] = e->way[i] + share * way[i];
-      sum = touch_zone(e, pose, e->moved, at, false, e->touch_trial, NULL);
+      sum = sonde_equilibrium_touch(e, pose, e->moved, at, false, e->touch_trial, NULL);
       energy = residual_of(e, at, e->touch_trial) + sum.energy_j;
       if (energy <= before - armijo * share * fall + inner_rounding * fabs(before)) break;
     }
@@ -219,8 +220,11 @@ typedef struct standing {
 // @return false: turned inside out
 static bool stand(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u, standing *s) {
   const size_t side = 3 * (size_t)e->zone_count, first = 3 * (size_t)sonde_zone_first(e);
-  if (!sonde_equilibrium_forces(e, u, &s->tissue_j, e->force)) return false;
-  s->touch = touch_zone(e, pose, u, NULL, false, e->touch, NULL);
+  s->tissue_j = 0;
+  memset(e->force, 0, 3 * (size_t)e->unknown_count * sizeof *e->force);
+  if (!sonde_equilibrium_add_forces(e, NULL, e->mesh->count, u, &s->tissue_j, e->force))
+    return false;
+  s->touch = sonde_equilibrium_touch(e, pose, u, NULL, false, e->touch, NULL);
   s->energy_j = s->tissue_j + s->touch.energy_j;
   double rest = product(e->force, e->force, first), load = 0;
   for (size_t i = 0; i < side; ++i) {
@@ -290,7 +294,7 @@ bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
       for (size_t k = 0; k < first + side; ++k) e->step[k] = k < first ? -e->force[k] : 0;
       sonde_numeric_reduce(&e->numeric, e->step);
       for (size_t k = 0; k < side; ++k) e->load[k] = e->step[first + k] - e->force[first + k];
-      inner = solve_contact(e, pose, n == 0);
+      inner = sonde_equilibrium_contact(e, pose, n == 0);
     }
     if (!inner) return false;
     memcpy(e->step + first, e->way, side * sizeof *e->way);
@@ -298,7 +302,7 @@ bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
     memcpy(e->step + first, e->way, side * sizeof *e->way);
     ++result->steps, result->inner_steps += inner, result->shifts += e->shift > 0;
     // The forces at the state again: the contact's were those of the last trial.
-    (void)touch_zone(e, pose, e->moved, NULL, false, e->touch, NULL);
+    (void)sonde_equilibrium_touch(e, pose, e->moved, NULL, false, e->touch, NULL);
     if (!search_line(e, pose, imposing, &s)) return false;
   }
   return false;
@@ -318,7 +322,7 @@ static double follow(sonde_equilibrium *e, sonde_vec3 way, bool bend) {
     return stiffness;
   }
   memset(e->matrix, 0, side * side * sizeof *e->matrix);
-  (void)touch_zone(e, e->pose, e->moved, NULL, bend, e->touch, e->matrix);
+  (void)sonde_equilibrium_touch(e, e->pose, e->moved, NULL, bend, e->touch, e->matrix);
   for (size_t i = 0; i < side; ++i) e->load[i] = product(e->matrix + i * side, e->way, side);
   stiffness = product(e->load, e->way, side);
   for (size_t i = 0; i < side * side; ++i) e->matrix[i] += e->schur[i];

@@ -7,15 +7,15 @@
 
 // ---- depth --------------------------------------------------------------------------------
 
-bool sonde_touch_depth(const sonde_touch_shape *s, sonde_vec3 point, double *depth_m,
-                       sonde_vec3 *out, sonde_mat3 *bend) {
-  SONDE_ASSERT(s != NULL && s->probe != NULL && s->rounding_m >= 0);
+bool sonde_touch_depth(const sonde_touch_shape *s, sonde_vec3 point, double margin_m,
+                       double *depth_m, sonde_vec3 *out, sonde_mat3 *bend) {
+  SONDE_ASSERT(s != NULL && s->probe != NULL && s->rounding_m >= 0 && margin_m >= 0);
   const double ball = s->probe->ball_radius_m, round = s->rounding_m;
   if (ball > 0) {
     sonde_vec3 from = v_sub(point, vec3(0, 0, -ball - round));
     double way = v_norm(from);
     *depth_m = ball + round - way;
-    if (*depth_m <= 0) return false;
+    if (*depth_m <= -margin_m) return false;
     *out = v_unit(from, vec3(0, 0, 1));
     *bend = way > 1e-9 ? m_rank1(*out, -1 / way, 1 / way) : m_zero();
     return true;
@@ -25,20 +25,27 @@ bool sonde_touch_depth(const sonde_touch_shape *s, sonde_vec3 point, double *dep
   const sonde_vec3 core = v_madd(point, round, vec3(0, 0, 1));
   double beyond = -INFINITY;
   uint32_t plane = 0;
-  if (v_norm2(core) > (body->radius_m + round) * (body->radius_m + round)) return false;
+  const double reach = round + margin_m, most = body->radius_m + reach;
+  if (v_norm2(core) > most * most) return false;
   for (uint32_t k = 0; k < body->plane_count; ++k) {
     double d = v_dot(body->plane_normal[k], core) - body->plane_offset_m[k];
-    if (d >= round) return false;
+    if (d >= reach) return false;
     if (d > beyond) beyond = d, plane = k;
   }
   *out = body->plane_normal[plane], *bend = m_zero();
   *depth_m = round - beyond;
-  if (beyond <= 0) return *depth_m > 0;
+  if (beyond <= 0) return *depth_m > -margin_m;
+  // A point whose foot on the farthest plane lies in the core is opposite the inside of that face.
+  bool inside = true;
+  const sonde_vec3 foot = v_madd(core, -beyond, *out);
+  for (uint32_t k = 0; k < body->plane_count && inside; ++k)
+    inside = k == plane || v_dot(body->plane_normal[k], foot) <= body->plane_offset_m[k];
+  if (inside) return true;
   // Outside of the core: the nearest of its faces, edges or corners.
   SONDE_ASSERT(s->hull != NULL);
   const sonde_surface_point near = sonde_surface_closest(s->hull, core);
   *depth_m = round - near.distance_m;
-  if (*depth_m <= 0) return false;
+  if (*depth_m <= -margin_m) return false;
   if (near.distance_m < 1e-9) return true;
   const sonde_vec3 normal = *out;
   *out = v_scale(v_sub(core, near.point_m), 1 / near.distance_m);
@@ -58,35 +65,40 @@ bool sonde_touch_depth(const sonde_touch_shape *s, sonde_vec3 point, double *dep
 
 // ---- a face -------------------------------------------------------------------------------
 
-bool sonde_touch_face(const sonde_touch_shape *s, sonde_pose pose, double stiffness_n_m3,
-                      const sonde_vec3 rest[4], const sonde_vec3 now[4], bool bend,
-                      sonde_touch *sum, double f[12], double (*k)[12]) {
+double sonde_touch_point(const sonde_vec3 rest[4], int point, double shape[4]) {
   static const double gauss[3] = {-0.77459666924148338, 0, 0.77459666924148338};
   static const double part[3] = {5.0 / 9, 8.0 / 9, 5.0 / 9};
   static const double sign[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+  SONDE_ASSERT(point >= 0 && point < SONDE_TOUCH_POINTS);
+  sonde_vec3 t[2] = {vec3(0, 0, 0), vec3(0, 0, 0)};
+  for (int c = 0; c < 4; ++c) {
+    const double *g = sign[c], u = 1 + g[0] * gauss[point % 3], v = 1 + g[1] * gauss[point / 3];
+    shape[c] = 0.25 * u * v;
+    t[0] = v_madd(t[0], 0.25 * g[0] * v, rest[c]);
+    t[1] = v_madd(t[1], 0.25 * g[1] * u, rest[c]);
+  }
+  return part[point % 3] * part[point / 3] * v_norm(v_cross(t[0], t[1]));
+}
+
+bool sonde_touch_face(const sonde_touch_shape *s, sonde_pose pose, double stiffness_n_m3,
+                      const sonde_vec3 rest[4], const sonde_vec3 now[4], bool bend,
+                      sonde_touch *sum, double f[12], double (*k)[12]) {
   SONDE_ASSERT(sum != NULL && f != NULL && stiffness_n_m3 > 0);
   const sonde_mat3 turn = q_matrix(pose.rotation), back = m_transpose(turn);
   bool touches = false;
-  for (int p = 0; p < 9; ++p) {
-    const double a = gauss[p % 3], b = gauss[p / 3];
+  for (int p = 0; p < SONDE_TOUCH_POINTS; ++p) {
     double shape[4], depth;
-    sonde_vec3 x = vec3(0, 0, 0), t[2] = {x, x}, out;
+    sonde_vec3 x = vec3(0, 0, 0), out;
     sonde_mat3 change;
-    for (int c = 0; c < 4; ++c) {
-      const double *g = sign[c], u = 1 + g[0] * a, v = 1 + g[1] * b;
-      shape[c] = 0.25 * u * v;
-      x = v_madd(x, shape[c], now[c]);
-      t[0] = v_madd(t[0], 0.25 * g[0] * v, rest[c]);
-      t[1] = v_madd(t[1], 0.25 * g[1] * u, rest[c]);
-    }
+    const double area = sonde_touch_point(rest, p, shape);
+    for (int c = 0; c < 4; ++c) x = v_madd(x, shape[c], now[c]);
     const sonde_vec3 local = m_mul_v(back, v_sub(x, pose.position));
-    if (!sonde_touch_depth(s, local, &depth, &out, &change)) continue;
+    if (!sonde_touch_depth(s, local, 0, &depth, &out, &change)) continue;
     if (!touches) {
       touches = true;
       memset(f, 0, 12 * sizeof *f);
       if (k) memset(k, 0, 12 * sizeof *k);
     }
-    const double area = part[p % 3] * part[p / 3] * v_norm(v_cross(t[0], t[1]));
     const double w = stiffness_n_m3 * area;
     out = m_mul_v(turn, out);
     const sonde_vec3 push = v_scale(out, w * depth);

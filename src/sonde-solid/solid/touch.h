@@ -13,10 +13,15 @@ typedef struct sonde_touch_shape {
   double rounding_m;
 } sonde_touch_shape;
 
-// How deep a point of the probe's frame lies in it; @return false: not at all.
+// How deep a point of the probe's frame lies in it, negative up to margin_m outside of it; @return
+// false: not at all, and farther than the margin.
 // @param out unit, the way out; bend the change of `out` with the point (1/m)
-bool sonde_touch_depth(const sonde_touch_shape *shape, sonde_vec3 point, double *depth_m,
-                       sonde_vec3 *out, sonde_mat3 *bend);
+bool sonde_touch_depth(const sonde_touch_shape *shape, sonde_vec3 point, double margin_m,
+                       double *depth_m, sonde_vec3 *out, sonde_mat3 *bend);
+
+enum { SONDE_TOUCH_POINTS = 9 };
+// Shares of a face's corners in one of its points, and the area at rest that it stands for (m^2).
+double sonde_touch_point(const sonde_vec3 rest[4], int point, double shape[4]);
 
 // Sums of the contact over some faces.
 typedef struct sonde_touch {

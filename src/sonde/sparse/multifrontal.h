@@ -46,7 +46,7 @@ SONDE_LINK sonde_status sonde_symbolic_create(const sonde_symbolic_def *def,
                                               sonde_symbolic **symbolic, sonde_error *error);
 SONDE_LINK void sonde_symbolic_destroy(sonde_symbolic *symbolic);
 // Steps of sonde_numeric_step() with that budget from begin to the end.
-uint32_t sonde_symbolic_steps(const sonde_symbolic *symbolic, uint64_t budget);
+SONDE_LINK uint32_t sonde_symbolic_steps(const sonde_symbolic *symbolic, uint64_t budget);
 
 // Where the numbers of the matrix come from.
 typedef struct sonde_matrix_source {
@@ -78,10 +78,10 @@ SONDE_LINK sonde_status sonde_numeric_reserve(sonde_numeric *numeric,
 SONDE_LINK void sonde_numeric_clear(sonde_numeric *numeric);
 
 // Starts new numbers. @thread one at a time; no allocation, here and below
-void sonde_numeric_begin(sonde_numeric *numeric, const sonde_symbolic *symbolic,
-                         const sonde_matrix_source *source);
+SONDE_LINK void sonde_numeric_begin(sonde_numeric *numeric, const sonde_symbolic *symbolic,
+                                    const sonde_matrix_source *source);
 // Works for about `budget` multiplications. Returns true when all is factored or a pivot failed.
-bool sonde_numeric_step(sonde_numeric *numeric, uint64_t budget);
+SONDE_LINK bool sonde_numeric_step(sonde_numeric *numeric, uint64_t budget);
 // All of it now. False: a pivot is not positive.
 SONDE_LINK bool sonde_numeric_factor(sonde_numeric *numeric, const sonde_symbolic *symbolic,
                                      const sonde_matrix_source *source);

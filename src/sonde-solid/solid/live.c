@@ -1,0 +1,227 @@
+// A live solid: making, and what belongs to which pass.
+#include "live.h"
+
+#include "base/base.h"
+#include "haptics/motion.h"
+
+#include <string.h>
+
+enum { STUCK_MOST = 2 }; // passes without a step before a state goes back to rest
+
+sonde_solid_live_def sonde_solid_live_def_default(void) {
+  return (sonde_solid_live_def){.version = SONDE_DEF_VERSION,
+                                .solid = sonde_equilibrium_def_default(),
+                                .pass_ticks = 20,
+                                .factor_passes = 3,
+                                .skin_steps = 3,
+                                .skin_m = 20e-3,
+                                .lead_passes = 1.5,
+                                .refresh_m = 2.5e-3,
+                                .pass_m = 3e-3,
+                                .lag_m = 6e-3};
+}
+
+// Bulk, then nonlinear skin: hexahedra of the skin all of whose corners are in the patch or zone.
+// The points of the contact.
+static void arrange(sonde_solid_live *l) {
+  const sonde_equilibrium *e = l->e;
+  for (int skin = 0; skin < 2; ++skin)
+    for (uint32_t h = 0; h < e->mesh->count; ++h) {
+      bool inside = e->mesh->layer[h] == SONDE_SOLID_SKIN;
+      for (int c = 0; c < 8; ++c)
+        inside &= e->corner[h][c] == SONDE_HELD_CORNER || e->corner[h][c] >= sonde_patch_first(e);
+      if (inside != skin) continue;
+      l->is_skin[h] = inside;
+      l->hex[l->bulk_count + l->skin_count] = h;
+      ++*(inside ? &l->skin_count : &l->bulk_count);
+    }
+  for (uint32_t n = 0; n < l->point_count; ++n) {
+    sonde_live_point *p = &l->point[n];
+    const uint32_t face = e->face[n / SONDE_TOUCH_POINTS];
+    sonde_vec3 rest[4];
+    for (int c = 0; c < 4; ++c) {
+      rest[c] = e->mesh->node[e->mesh->face[face][c]];
+      p->node[c] = e->unknown[e->mesh->face[face][c]] - sonde_zone_first(e);
+    }
+    const double area = sonde_touch_point(rest, (int)(n % SONDE_TOUCH_POINTS), p->share);
+    p->soft_m_n = 1 / (e->def.contact_n_m3 * area);
+  }
+  for (uint32_t k = 0; k < e->zone_count; ++k) l->skin[k] = e->mesh->node[e->zone_node[k]];
+}
+
+static sonde_status reserve(sonde_solid_live *l, sonde_error *error) {
+  const sonde_equilibrium *e = l->e;
+  const size_t side = sonde_live_side(l), zone = 3 * (size_t)e->zone_count;
+  l->point_count = e->zone_faces * SONDE_TOUCH_POINTS;
+  l->width = (uint32_t)(zone + 15) / 16 * 16;
+  const struct {
+    void **array;
+    size_t count, size;
+  } parts[] = {
+      {(void **)&l->hex, e->mesh->count, sizeof *l->hex},
+      {(void **)&l->is_skin, e->mesh->count, sizeof *l->is_skin},
+      {(void **)&l->bulk_state, e->mesh->node_count, sizeof *l->bulk_state},
+      {(void **)&l->pull, side, sizeof *l->pull},
+      {(void **)&l->stretch, side, sizeof *l->stretch},
+      {(void **)&l->ways, side, sizeof *l->ways},
+      {(void **)&l->left, side, sizeof *l->left},
+      {(void **)&l->right, side, sizeof *l->right},
+      {(void **)&l->rest, side, sizeof *l->rest},
+      {(void **)&l->trial, side, sizeof *l->trial},
+      {(void **)&l->tangent, side * sonde_front_stride((uint32_t)side), sizeof *l->tangent},
+      {(void **)&l->inverse, zone * zone, sizeof *l->inverse},
+      {(void **)&l->shown[0].free_m, e->zone_count, sizeof *l->skin},
+      {(void **)&l->shown[1].free_m, e->zone_count, sizeof *l->skin},
+      {(void **)&l->shown[0].give_m_n, zone * l->width, sizeof(float)},
+      {(void **)&l->shown[1].give_m_n, zone * l->width, sizeof(float)},
+      {(void **)&l->point, l->point_count, sizeof *l->point},
+      {(void **)&l->candidate, l->point_count, sizeof *l->candidate},
+      {(void **)&l->rows, (size_t)l->point_count * l->width, sizeof *l->rows},
+      {(void **)&l->moved, l->width, sizeof *l->moved},
+      {(void **)&l->skin, e->zone_count, sizeof *l->skin},
+  };
+  for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k)
+    if (!(*parts[k].array = sonde_calloc(parts[k].count, parts[k].size)))
+      return sonde_fail_memory(error);
+  sonde_status status = SONDE_OK;
+  for (int k = 0; k < 2 && !status; ++k)
+    status = sonde_numeric_reserve(&l->bulk[k], e->symbolic, error);
+  return status;
+}
+
+// The tangent of a state at rest, all at once. @return false: there is no positive one
+static bool begin_at_rest(sonde_solid_live *l, sonde_live_tangent *shown) {
+  sonde_live_begin_factor(l);
+  if (!sonde_live_share_factor(l, UINT64_MAX) || !sonde_live_forces(l)) return false;
+  sonde_live_pull(l);
+  return sonde_live_show(l, shown);
+}
+
+sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe *probe,
+                                     sonde_pose start, const sonde_solid_live_def *def,
+                                     sonde_solid_live **live, sonde_error *error) {
+  SONDE_ASSERT(mesh != NULL && probe != NULL && def != NULL && live != NULL);
+  *live = NULL;
+  sonde_status status = sonde_def_check("a live solid", def->version, error);
+  const sonde_bounded range[] = {
+      {"pass_ticks", def->pass_ticks, 1, 1000}, {"factor_passes", def->factor_passes, 1, 100},
+      {"skin_steps", def->skin_steps, 1, 20},   {"skin_m", def->skin_m, 1e-3, 0.2},
+      {"lead_passes", def->lead_passes, 0, 5},  {"refresh_m", def->refresh_m, 1e-5, 0.05},
+      {"pass_m", def->pass_m, 1e-5, 0.05},      {"lag_m", def->lag_m, def->refresh_m, 0.1}};
+  if (!status) status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  if (!status && def->solid.bonded)
+    status = sonde_fail(error, SONDE_ARGUMENT, "bonded: expected a probe that slides");
+  if (status) return status;
+  sonde_solid_live *l = SONDE_NEW(sonde_solid_live, 1);
+  if (!l) return sonde_fail_memory(error);
+  l->def = *def;
+  status = sonde_equilibrium_place(mesh, probe, start, &def->solid, def->skin_m, &l->e, error);
+  if (!status) status = reserve(l, error);
+  if (!status) {
+    l->before = start;
+    arrange(l);
+    // As many multiplications per pass as let the passes make a factor.
+    l->slice = 1000000;
+    while (sonde_symbolic_steps(l->e->symbolic, l->slice) > def->factor_passes)
+      l->slice += l->slice / 16;
+    if (!begin_at_rest(l, &l->shown[0]))
+      status = sonde_fail(error, SONDE_CONVERGENCE, "the solid has no positive stiffness at rest");
+    l->counts.factors = 0;
+  }
+  if (!status) {
+    *live = l;
+    return SONDE_OK;
+  }
+  sonde_solid_live_destroy(l);
+  return status;
+}
+
+void sonde_solid_live_destroy(sonde_solid_live *l) {
+  if (!l) return;
+  void *parts[] = {l->hex,
+                   l->is_skin,
+                   l->bulk_state,
+                   l->pull,
+                   l->stretch,
+                   l->ways,
+                   l->left,
+                   l->right,
+                   l->rest,
+                   l->trial,
+                   l->tangent,
+                   l->inverse,
+                   l->shown[0].free_m,
+                   l->shown[1].free_m,
+                   l->shown[0].give_m_n,
+                   l->shown[1].give_m_n,
+                   l->point,
+                   l->candidate,
+                   l->rows,
+                   l->moved,
+                   l->skin};
+  for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
+  for (int k = 0; k < 2; ++k) sonde_numeric_clear(&l->bulk[k]);
+  sonde_equilibrium_destroy(l->e);
+  sonde_free(l);
+}
+
+// ---- passes ---------------------------------------------------------------------------------
+
+bool sonde_solid_live_work(sonde_solid_live *l) {
+  SONDE_ASSERT(l != NULL);
+  const uint32_t asked = atomic_load_explicit(&l->asked, memory_order_acquire);
+  if (asked == atomic_load_explicit(&l->done, memory_order_relaxed)) return false;
+  sonde_equilibrium *e = l->e;
+  // A tangent serves ahead of its pass. The state goes no farther from itself, and from where the
+  // bulk was factored, than they bear.
+  const sonde_pose motion = pose_mul(l->asked_pose, pose_inverse(l->before));
+  sonde_pose pose = l->before = l->asked_pose;
+  for (double lead = l->def.lead_passes; lead > 0; lead -= 1)
+    pose = sonde_pose_blend(pose, pose_mul(motion, pose), fmin(lead, 1));
+  const double way = sonde_equilibrium_way(e->pose, pose);
+  if (way > l->def.pass_m) pose = sonde_pose_blend(e->pose, pose, l->def.pass_m / way);
+  const sonde_pose middle = l->bulk_pose[l->serves];
+  const double lag = sonde_equilibrium_way(middle, pose);
+  if (lag > l->def.lag_m) pose = sonde_pose_blend(middle, pose, l->def.lag_m / lag);
+  l->counts.held += way > l->def.pass_m || lag > l->def.lag_m;
+  bool found = sonde_live_follow(l, pose);
+  if (found) e->pose = pose;
+  // A factor begins when the probe has left the place of the latest one, when a shift has to make
+  // it positive definite, and when one was shifted.
+  if (!l->making && (l->shift > 0 || l->is_shifted[l->serves] ||
+                     sonde_equilibrium_way(l->bulk_pose[l->serves], e->pose) > l->def.refresh_m))
+    sonde_live_begin_factor(l);
+  (void)sonde_live_share_factor(l, l->slice);
+  sonde_live_pull(l);
+  sonde_live_tangent *next = &l->shown[asked & 1], *last = &l->shown[!(asked & 1)];
+  if (!sonde_live_show(l, next)) {
+    found = false;
+    memcpy(next->free_m, last->free_m, e->zone_count * sizeof *next->free_m);
+    memcpy(next->give_m_n, last->give_m_n,
+           3 * (size_t)e->zone_count * l->width * sizeof *next->give_m_n);
+  }
+  // A state that finds no way on goes back to rest, from where it follows the probe again.
+  l->counts.kept += !found;
+  l->stuck = found ? 0 : l->stuck + 1;
+  if (l->stuck > STUCK_MOST) {
+    memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
+    e->pose = e->start;
+    l->making = false, l->shift = 0, l->stuck = 0;
+    begin_at_rest(l, next);
+  }
+  ++l->counts.passes;
+  atomic_store_explicit(&l->done, asked, memory_order_release);
+  return true;
+}
+
+sonde_solid_live_counts sonde_solid_live_count(const sonde_solid_live *l) {
+  SONDE_ASSERT(l != NULL);
+  sonde_solid_live_counts counts = l->counts;
+  counts.ticks = l->ticks, counts.late = l->late;
+  return counts;
+}
+
+const sonde_vec3 *sonde_solid_live_state(const sonde_solid_live *l) {
+  SONDE_ASSERT(l != NULL);
+  return l->e->moved;
+}

@@ -1,0 +1,97 @@
+// Inside of a live solid. The worker owns all but the tick's part; tangents change hands by the
+// counts of passes asked for and done.
+#ifndef SONDE_SRC_SOLID_LIVE_H
+#define SONDE_SRC_SOLID_LIVE_H
+
+#include "equilibrium.h"
+#include "sonde/solid_live.h"
+
+#include <stdatomic.h>
+
+// The solid as the tick sees it: where the zone's skin would be without a probe, and how it gives.
+typedef struct sonde_live_tangent {
+  sonde_vec3 *free_m; // [zone_count] places
+  float *give_m_n;    // [side][width] displacements of the zone's nodes for a force on one
+} sonde_live_tangent;
+
+// A point of the contact's quadrature.
+typedef struct sonde_live_point {
+  uint32_t node[4]; // of the zone
+  double share[4];  // of the nodes
+  double soft_m_n;  // depth per force of the contact
+  float load_n;     // pushes the skin out, from tick to tick
+} sonde_live_point;
+
+// A point that may bear a force in a tick.
+typedef struct sonde_live_candidate {
+  sonde_live_point *point;
+  sonde_vec3 out; // unit, the way the skin is pushed
+  sonde_vec3 arm; // from the probe's origin
+  float part[12]; // out times share, by node and axis
+  float depth_m;  // without any force
+  float give_m_n; // own, with the contact's; 0: `row` is not made yet
+  float *row;     // [width] displacements of the zone's nodes for a force on the point
+} sonde_live_candidate;
+
+struct sonde_solid_live {
+  sonde_solid_live_def def;
+  sonde_equilibrium *e; // the state of the last pass, its numbering, its contact
+
+  // The worker's. Hexahedra of the bulk, then those of the skin that stay nonlinear.
+  uint32_t *hex, bulk_count, skin_count;
+  uint8_t *is_skin;      // [hexes]
+  sonde_numeric bulk[2]; // the factor that serves and the one in the making
+  sonde_pose bulk_pose[2];
+  bool is_shifted[2];
+  int serves;
+  sonde_pose before; // that the pass before was asked for
+  bool making;
+  uint32_t stuck;               // passes in a row that found no step
+  double shift;                 // of the factor in the making, over an element's mean diagonal
+  uint64_t slice;               // multiplications of a factor per pass
+  sonde_vec3 *bulk_state;       // [node_count] that the factor in the making is of
+  double *pull;                 // [patch side] load of the condensed bulk at the state
+  double *stretch;              // [patch side] what the bulk exerts for the ways of this pass
+  double *ways;                 // [patch side] of this pass
+  double *left;                 // [patch side] right-hand side, then ways of a step
+  double *right, *rest, *trial; // [patch side]
+  double *tangent;              // [patch side][stride] by columns: eliminated down to the zone
+  bool ready;                   // `tangent` is that of the state
+  double *inverse;              // [zone side * zone side]
+  sonde_solid_live_counts counts;
+
+  // Both: a pass writes tangent[pass & 1].
+  _Atomic uint32_t asked, done; // passes
+  sonde_pose asked_pose;
+  sonde_live_tangent shown[2];
+
+  // The tick's.
+  uint32_t point_count, width, serving;
+  uint64_t ticks;
+  uint32_t late;
+  sonde_live_point *point;         // [zone_faces * SONDE_TOUCH_POINTS]
+  sonde_live_candidate *candidate; // [point_count]
+  float *rows;                     // [point_count][width]
+  float *moved;                    // [width] displacements of the zone's nodes under the loads
+  sonde_vec3 *skin;                // [zone_count] places of the last tick
+};
+
+static inline size_t sonde_live_side(const sonde_solid_live *l) { // of patch and zone
+  return 3 * (size_t)(l->e->patch_count + l->e->zone_count);
+}
+
+// Begins the factor of the state, all of it or in slices.
+void sonde_live_begin_factor(sonde_solid_live *live);
+// One share of it; a finished factor serves from then on. @return false: it is not done yet
+bool sonde_live_share_factor(sonde_solid_live *live, uint64_t budget);
+// Forces of the bulk at the state. @return false: turned inside out
+bool sonde_live_forces(sonde_solid_live *live);
+// The load of the condensed bulk, of these forces.
+void sonde_live_pull(sonde_solid_live *live);
+// The tangent at the state, condensed on the zone, for the tick. @return false: no positive one
+bool sonde_live_show(sonde_solid_live *live, sonde_live_tangent *shown);
+// Takes the state to a pose: the skin's Newton steps, then the bulk; leaves the forces there.
+// @return false: no step found, the state is the old one
+bool sonde_live_follow(sonde_solid_live *live, sonde_pose pose);
+
+#endif
