@@ -124,6 +124,12 @@ static void a_body_comes_back(void **state) {
     given.girth_calf_m = 0.4;
     assert_int_equal(sonde_leg_scan_body(&s.scan, 1, &given, &girths, NULL), SONDE_OK);
     assert_true(given.girth_calf_m == 0.4 && given.girth_knee_m == got.girth_knee_m);
+    // The bone itself is no skin around it.
+    sonde_error bare = {0};
+    s.scan.skin = &s.femur;
+    assert_int_equal(sonde_leg_scan_body(&s.scan, 1, &given, &girths, &bare), SONDE_MESH);
+    assert_non_null(strstr(bare.message, "around the femur"));
+    s.scan.skin = &s.skin;
     // As a leg of the other side its condyles stand in front.
     sonde_error error = {0};
     s.scan.left = !s.scan.left, s.scan.axes = SONDE_AXES_ANY;

@@ -4,7 +4,8 @@
 #include "anatomy/scan.h"
 
 static const double STEP_M = 0.005, LEAST_LEG_M = 0.6, MOST_LEG_M = 1.3, USUAL_SKIN_M = 0.0018;
-static const double UPPER_END_M = 0.005; // a scan is cut unevenly
+static const double UPPER_END_M = 0.005;                       // a scan is cut unevenly
+static const double LEAST_GIRTH_M = 0.28, MOST_GIRTH_M = 0.95; // of a thigh
 // Levels of a limb with the largest girth of the calf and the least above the ankle, and of the
 // groin crease, where a skin without a femur begins.
 static const double CALF = 1.28, ANKLE = 1.866, CREASE = 0.05, THIGH = 0.12, KNEE = 0.88;
@@ -308,6 +309,17 @@ sonde_status sonde_leg_scan_body(const sonde_leg_scan *scan, uint64_t seed, sond
                           "expected a leg from the groin to below the ankle, or a femur",
                           l->count);
   }
+  // Half-way down the thigh rays from the line between hip and knee, or from the section's middle,
+  // meet the skin on all sides.
+  double half_m = 0;
+  sonde_vec3 middle = vec3(0, 0, 0.5 * l->thigh_m);
+  const bool around = !status && scan->femur && scan_section(l->skin, &l->f, &middle, &half_m);
+  if (!status && !scan->femur) half_m = girth_at(l, 0.5 * l->thigh_m);
+  if (!status && !((around || !scan->femur) && half_m > LEAST_GIRTH_M && half_m < MOST_GIRTH_M))
+    status = sonde_fail(error, SONDE_MESH,
+                        "the skin's girth half-way down the thigh is %.0f mm, expected a closed "
+                        "section of %.0f to %.0f around the femur",
+                        half_m * 1e3, LEAST_GIRTH_M * 1e3, MOST_GIRTH_M * 1e3);
   if (!status) {
     measure(l, head_m, body, girths);
     infer(body, seed, &body->stature_m, 1.4, 2.1, &body->thigh_length_m);
