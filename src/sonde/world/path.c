@@ -176,14 +176,6 @@ static sonde_status create_equilibria(path *p, sonde_error *error) {
   return SONDE_OK;
 }
 
-static void destroy_equilibria(path *p) {
-  equilibrium *all[] = {&p->here, &p->half, &p->whole, &p->end};
-  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
-    sonde_free(all[k]->position);
-    sonde_free(all[k]->touched);
-  }
-}
-
 // Exact at the end; says why when that is not where the press was to go.
 static sonde_status conclude(path *p, sonde_error *error) {
   sonde_path_result *r = p->result;
@@ -227,6 +219,10 @@ sonde_status sonde_settle_path(sonde_state *state, const sonde_probe *probe, son
   if (!status && p.end.settled.converged && p.end.force_n >= p.def->force_n && p.end.share > 0)
     meet_force(&p);
   if (!status) status = conclude(&p, error);
-  destroy_equilibria(&p);
+  equilibrium *all[] = {&p.here, &p.half, &p.whole, &p.end};
+  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
+    sonde_free(all[k]->position);
+    sonde_free(all[k]->touched);
+  }
   return status;
 }
