@@ -171,11 +171,9 @@ static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error
     const char *const texts[] = {c.pathology.name, fault};
     for (int k = 0; o->csv && k < COLUMNS; ++k)
       sonde_file_printf(o->csv, isfinite(list[k].value) ? "%.9g," : ",", list[k].value);
-    for (int k = 0; o->csv && k < 2; ++k) { // quoted, with quotes doubled
-      sonde_file_printf(o->csv, "\"");
-      for (const char *t = texts[k]; *t; ++t)
-        sonde_file_printf(o->csv, *t == '"' ? "\"\"" : "%c", *t);
-      sonde_file_printf(o->csv, k ? "\"\n" : "\",");
+    for (int k = 0; o->csv && k < 2; ++k) {
+      sonde_csv_put_text(o->csv, texts[k]);
+      sonde_file_printf(o->csv, k ? "\n" : ",");
     }
     if (o->json.file) {
       sonde_json_begin_object(&o->json, NULL);

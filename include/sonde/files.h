@@ -41,6 +41,10 @@ SONDE_API sonde_status sonde_colours_save_png(const sonde_colours *picture, cons
 SONDE_API sonde_status sonde_report_write(const char *path, const char *title, const char *json,
                                           size_t length, sonde_error *error);
 
+/** Writes a text of a CSV row in quotation marks, those within it doubled (RFC 4180).
+ * @thread owner */
+SONDE_API void sonde_csv_put_text(sonde_file *file, const char *utf8);
+
 /** Begins a drawing as SVG on an output file: lengths in pixels, y downwards, on white; words in
  * the classes tick, head, middle, end, light. @param title UTF-8 @thread owner */
 SONDE_API void sonde_svg_begin(sonde_file *file, const char *title, double width, double height);

@@ -189,10 +189,9 @@ sonde_status sonde_worksheet_save_csv(const sonde_worksheet *sheet, const sonde_
     uint32_t pictures[2] = {0};
     for (uint32_t k = 0; k < sheet->picture_count; ++k)
       if (sheet->picture[k].place == i) pictures[sheet->picture[k].compressed]++;
-    sonde_file_printf(file, "%u,\"", i + 1);
-    for (const char *c = plan->point[i].title; *c; ++c)
-      sonde_file_printf(file, *c == '"' ? "\"\"" : "%c", *c);
-    sonde_file_printf(file, "\",%s,%s,%s,%s,", sonde_sheet_word(SONDE_SHEET_FINDINGS, row->finding),
+    sonde_file_printf(file, "%u,", i + 1);
+    sonde_csv_put_text(file, plan->point[i].title);
+    sonde_file_printf(file, ",%s,%s,%s,%s,", sonde_sheet_word(SONDE_SHEET_FINDINGS, row->finding),
                       sonde_sheet_word(SONDE_SHEET_AGES, row->age),
                       sonde_sheet_word(SONDE_SHEET_KINDS, row->kind),
                       sonde_sheet_word(SONDE_SHEET_REFLUXES, row->reflux));
