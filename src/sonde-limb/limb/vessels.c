@@ -158,7 +158,7 @@ sonde_status limb_vessels_make(sonde_limb *limb, sonde_error *error) {
   v->limb = limb;
   v->draws = limb_vessel_draws(limb);
   limb_vessels_lay_arteries(v);
-  sonde_status status = limb_vessels_relax(v, 60, true, error);
+  sonde_status status = limb_vessels_relax(v, 60, true, false, error);
   if (status) return status;
   limb_vessels_lay_veins(v);
   limb_vessels_lay_deep_femoral(v);
@@ -175,17 +175,18 @@ sonde_status limb_vessels_make(sonde_limb *limb, sonde_error *error) {
       double room = 0.5 * limb_fat(limb, level, degrees * DEGREE) - place->wall - 0.0006;
       if (v->branch[b].layer != LAYER_ANY) place->radius = fmin(place->radius, fmax(room, 0.0003));
     }
-  status = limb_vessels_relax(v, 60, true, error);
+  status = limb_vessels_relax(v, 60, true, false, error);
   if (status) return status;
   limb_vessels_lay_perforators(v);
-  status = limb_vessels_relax(v, 100, true, error);
-  // What is crowded takes longer: on until every place keeps its distances, at last also where a
-  // companion vein has to leave its artery for it.
+  status = limb_vessels_relax(v, 100, true, false, error);
+  // What is crowded takes longer: on until every place keeps its distances, later also where a
+  // companion vein has to leave its artery for it, at last where a vein has to bend as sharply as
+  // the fascia below it.
   for (uint32_t more = 0; more < 25 && !status; ++more) {
     status = limb_vessels_count_faults(v, error);
     const sonde_limb_vessel_faults *f = &v->faults;
     if (status || f->walls + f->bone + f->fascia + f->eye == 0) break;
-    status = limb_vessels_relax(v, 40, more < 6, error);
+    status = limb_vessels_relax(v, 40, more < 6, more >= 15, error);
   }
   // Arcs along the lines as they lie now.
   for (uint32_t b = 0; b < v->branches; ++b) {

@@ -204,8 +204,8 @@ void limb_vessels_lay_perforators(struct limb_vessels *v);
 void limb_nerves_lay(struct limb_vessels *v);
 void limb_lymph_lay(struct limb_vessels *v);
 // Moves centre lines apart and away from bones and fascia, with `close` also companion veins to
-// their arteries; counts what is left in faults.
-sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool close,
+// their arteries, with `sharp` each place for itself; counts what is left in faults.
+sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool close, bool sharp,
                                 sonde_error *error);
 sonde_status limb_vessels_count_faults(struct limb_vessels *v, sonde_error *error);
 // @param fine false: larger cells, made sooner, that answer slower and the same

@@ -237,7 +237,7 @@ static void end(neighbours *n) {
   sonde_free(n->clear);
 }
 
-sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool close,
+sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool close, bool sharp,
                                 sonde_error *error) {
   neighbours n;
   sonde_vec3 *step = SONDE_NEW(sonde_vec3, 2 * v->places);
@@ -249,11 +249,12 @@ sonde_status limb_vessels_relax(struct limb_vessels *v, uint32_t passes, bool cl
     for_pairs(&n, push_pair, &s);
     push_out(&n, step);
     if (close) pull_mates(&n, &s);
-    // Each branch spreads the steps along itself; its own bends lose a little.
+    // Each branch spreads the steps along itself, unless it may bend sharply; its own bends lose a
+    // little.
     sonde_vec3 *spare = step + v->places;
     for (uint32_t b = 0; b < v->branches; ++b) {
       uint32_t first = v->branch[b].first, count = v->branch[b].count;
-      for (int twice = 0; twice < 2; ++twice) {
+      for (int twice = 0; twice < 2 && !sharp; ++twice) {
         for (uint32_t k = 0; k < count; ++k) {
           sonde_vec3 before = step[first + (k > 0 ? k - 1 : 0)],
                      after = step[first + (k + 1 < count ? k + 1 : k)];
