@@ -16,7 +16,7 @@ enum { MAX_PROBES = 16 };
 
 typedef struct options {
   const char *model, *record, *probe, *pathology, *preset, *compare;
-  const char *trainee, *exams, *cases, *protocols, *scanner;
+  const char *trainee, *exams, *cases, *protocols, *course, *scanner;
   long port, images_hz;
   double seconds, gel_m3;
   bool headless, lockstep, json, no_gel, circulate;
@@ -90,6 +90,7 @@ static const app_option TABLE[] = {
              "default: sonde/exams in $XDG_DATA_HOME or ~/.local/share"),
     OPT_TEXT(cases, "cases", "DIR", "other cases than those that ship"),
     OPT_TEXT(protocols, "protocols", "DIR", "other protocols than those that ship"),
+    OPT_TEXT(course, "course", "DIR", "another course than the one that ships"),
     OPT_FLAG(json, "json", "headless: print one JSON object at the end")};
 
 // What a headless run saw.
@@ -177,6 +178,9 @@ static sonde_status run_exams(const options *s, const sonde_model *model,
                       .bundled_path = library.has_bundled ? library.bundled : NULL,
                       .cases = library.cases,
                       .protocols = library.protocols,
+                      .course = s->course           ? s->course
+                                : library.course[0] ? library.course
+                                                    : NULL,
                       .exams = exams,
                       .trainee = trainee ? trainee : "",
                       .practice = *session_def,

@@ -1,5 +1,5 @@
 // Practice, exams and replays behind one page: sessions, phases, requests.
-#include "exam_app_parts.h"
+#include "exam_app_lesson.h"
 #include "page_token.h"
 
 #include <assert.h>
@@ -92,6 +92,8 @@ void exam_app_change(exam_app *app, exam *next, exam_replay *replay) {
   app->exam = next;
   pthread_mutex_unlock(&app->lock);
   app->replay = replay;
+  exam_film_destroy(app->film);
+  app->film = NULL;
   exam_destroy(exam_before);
   exam_replay_destroy(replay_before);
 }
@@ -129,7 +131,12 @@ static sonde_status put_note(exam_app *app, sonde_note_kind kind, const char *co
 
 static sonde_status answer(exam_app *app, const sonde_page_request *request, sonde_error *error) {
   switch (request->ask) {
-  case SONDE_PAGE_START_EXAM: return exam_start(app, request, error);
+  case SONDE_PAGE_START_EXAM:
+  case SONDE_PAGE_START_LESSON: return exam_start(app, request, error);
+  case SONDE_PAGE_DEMONSTRATE: return exam_film_open(app, request->id, error);
+  case SONDE_PAGE_NEXT:
+    if (app->film) app->film->read_until_s = 0;
+    return SONDE_OK;
   case SONDE_PAGE_DECIDE: {
     sonde_decision decision;
     if (app->phase != EXAM_RUNNING)
@@ -162,6 +169,11 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
   case SONDE_PAGE_OPEN_REPLAY: return exam_replay_open(app, request->id, error);
   case SONDE_PAGE_SEEK: return exam_replay_seek(app, request->time_s, error);
   case SONDE_PAGE_PLAY:
+    if (app->phase == EXAM_FILM) {
+      app->film->playing = request->playing && !app->film->over;
+      app->film->speed = request->speed;
+      return SONDE_OK;
+    }
     if (app->phase != EXAM_REPLAY)
       return app_error(error, SONDE_ARGUMENT, "there is no replay to play");
     app->replay->playing = request->playing;
@@ -191,6 +203,7 @@ void exam_app_turn(exam_app *app) {
     asked = true;
   }
   if (app->phase == EXAM_REPLAY) exam_replay_turn(app);
+  if (app->phase == EXAM_FILM) exam_film_turn(app);
   exam_app_watch_disk(app);
   exam_app_keep(app);
   double now_s = app_seconds(CLOCK_MONOTONIC);
@@ -220,6 +233,7 @@ sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_erro
   if (!status)
     status =
         sonde_exam_protocol_list(app->protocols, &app->protocol_list, &app->protocol_count, error);
+  if (!status && def->course) status = sonde_course_load(def->course, &app->course, error);
   if (!status) status = sonde_directory_make(app->exams, 0700, true, error);
   if (!status)
     status = sonde_exam_log_open(exam_app_path(path, app->exams, "exams.sqlite"), &app->log, error);
@@ -291,6 +305,8 @@ sonde_status exam_app_destroy(exam_app *app, sonde_error *error) {
   sonde_status status = sonde_session_destroy(app->session, error);
   exam_destroy(app->exam);
   exam_replay_destroy(app->replay);
+  exam_film_destroy(app->film);
+  sonde_course_clear(&app->course);
   sonde_exam_log_close(app->log);
   for (uint32_t i = 0; i < app->probe_count; ++i) sonde_probe_clear(&app->probes[i]);
   free(app->probes);

@@ -14,6 +14,7 @@ typedef struct exam_app_def {
   sonde_site start;         // where the probe of free practice begins
   const char *cases;        // directories
   const char *protocols;
+  const char *course;         // NULL: none
   const char *exams;          // created when it is missing
   const char *trainee;        // "" unknown
   sonde_session_def practice; // model is set from above

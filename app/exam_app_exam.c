@@ -1,5 +1,5 @@
 // An exam: begun on a case's thigh, watched frame by frame, judged.
-#include "exam_app_parts.h"
+#include "exam_app_lesson.h"
 
 #include <assert.h>
 #include <math.h>
@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static bool show_progress(double fraction, const char *what, void *user) {
+bool exam_app_show_progress(double fraction, const char *what, void *user) {
   exam_app *app = user;
   (void)what;
   app->progress = fraction;
@@ -52,6 +52,7 @@ static sonde_status begin_part(exam_app *app, exam *of, uint32_t held, uint32_t 
   def.model_path = of->patient.thigh == SONDE_CASE_BUNDLED ? app->def.model_path : NULL;
   def.record_path = recording;
   def.record_setup = setup;
+  if (of->lesson && of->lesson->doppler) def.controls.duplex.shown = SONDE_DUPLEX_VELOCITY;
   def.watch = watch;
   def.watch_user = of;
   sonde_vein_point first = sonde_vein_at(&lies->map, 0.0);
@@ -66,27 +67,51 @@ static sonde_status begin_part(exam_app *app, exam *of, uint32_t held, uint32_t 
   return status;
 }
 
-sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_error *error) {
+sonde_status exam_choose(const exam_app *app, const sonde_page_request *request, exam *of,
+                         sonde_error *error) {
+  const bool practises = request->ask == SONDE_PAGE_START_LESSON;
   const sonde_case *patient = NULL;
-  const sonde_exam_protocol *protocol = NULL;
-  for (uint32_t i = 0; i < app->case_count; ++i) {
+  const char *guidance = request->guidance;
+  if (practises) {
+    const uint32_t k = sonde_course_find(&app->course, request->id);
+    if (k == app->course.count)
+      return app_error(error, SONDE_NOT_FOUND, "there is no lesson of that name");
+    of->lesson = &app->course.lesson[k];
+    of->turn = request->turn < of->lesson->turn_count ? request->turn : of->lesson->turn_count - 1;
+    of->protocol = &of->lesson->protocol;
+    guidance = sonde_guidance_level_name(of->lesson->turn[of->turn]);
+    // A drawn patient is none of those that the bar was measured on.
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    const uint64_t seed = (uint64_t)now.tv_sec * 1000 + (uint64_t)now.tv_nsec / 1000000;
+    sonde_lesson_patient(of->lesson, seed, &of->patient);
+  }
+  for (uint32_t i = 0; i < app->case_count && !practises; ++i) {
     char alias[EXAM_ALIAS];
     exam_app_case_alias(app, app->case_list[i].id, alias);
     if (strcmp(alias, request->id) == 0) patient = &app->case_list[i];
   }
-  for (uint32_t i = 0; i < app->protocol_count; ++i)
-    if (strcmp(app->protocol_list[i].id, request->protocol) == 0) protocol = &app->protocol_list[i];
-  if (!patient || !protocol)
+  for (uint32_t i = 0; i < app->protocol_count && !practises; ++i)
+    if (strcmp(app->protocol_list[i].id, request->protocol) == 0)
+      of->protocol = &app->protocol_list[i];
+  if (!practises && (!patient || !of->protocol))
     return app_error(error, SONDE_NOT_FOUND, "there is no %s of that name",
                      patient ? "protocol" : "case");
+  if (patient) of->patient = *patient;
+  snprintf(of->guidance, sizeof of->guidance, "%.*s", (int)sizeof of->guidance - 1, guidance);
+  snprintf(of->trainee, sizeof of->trainee, "%.*s", (int)sizeof of->trainee - 1, request->name);
+  return SONDE_OK;
+}
+
+sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_error *error) {
   exam *of = calloc(1, sizeof *of);
   if (!of) return app_error(error, SONDE_MEMORY, "out of memory");
   of->lock = &app->lock;
-  of->patient = *patient;
-  of->protocol = protocol;
-  snprintf(of->guidance, sizeof of->guidance, "%.*s", (int)sizeof of->guidance - 1,
-           request->guidance);
-  snprintf(of->trainee, sizeof of->trainee, "%.*s", (int)sizeof of->trainee - 1, request->name);
+  sonde_status status = exam_choose(app, request, of, error);
+  if (status) {
+    free(of);
+    return status;
+  }
   snprintf(app->trainee, sizeof app->trainee, "%s", of->trainee);
   exam_phase before = app->phase;
   exam_app_set_phase(app, EXAM_PREPARING,
@@ -94,8 +119,8 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
   const sonde_session *session = app->session;
   // The learner is told nothing before the session is shown.
   char stamp[32];
-  sonde_progress progress = {show_progress, app};
-  sonde_status status = exam_prepare(of, exam_app_bundled(app), app->cases, &progress, error);
+  sonde_progress progress = {exam_app_show_progress, app};
+  status = exam_prepare(of, exam_app_bundled(app), app->cases, &progress, error);
   app->progress = 0;
   if (!status) {
     // Date, id and directory; the mark tells exams of the same second apart.
@@ -188,6 +213,7 @@ void exam_observe(exam *of, const sonde_frame *frame) {
   uint32_t presses, n = of->sample_count;
   sonde_judge_feed(of->judge, s);
   of->seen_tick = s->tick;
+  of->seen = *s;
   exam_sheet_watch(of, frame);
 
   // The press that just ended takes both images.

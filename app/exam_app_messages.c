@@ -1,6 +1,6 @@
 // What the page is told, as JSON: docs/page_protocol.md. Millimetres, degrees and words for people
 // exist only here.
-#include "exam_app_parts.h"
+#include "exam_app_lesson.h"
 
 #include <assert.h>
 #include <math.h>
@@ -111,6 +111,7 @@ void exam_app_tell_greeting(exam_app *app) {
     sonde_json_end(&out);
   }
   sonde_json_end(&out);
+  exam_app_put_course(app, &out);
   publish(app, SONDE_PAGE_GREETING, &out);
 }
 
@@ -208,8 +209,10 @@ static void put_result(sonde_json_out *out, const exam_app *app, const exam *of)
   sonde_json_end(out);
 }
 
+// In the order of exam_phase.
+static const char *const PHASES[] = {"practice", "preparing", "running", "done", "replay", "film"};
+
 void exam_app_tell_exam(exam_app *app) {
-  static const char *const PHASES[] = {"practice", "preparing", "running", "done", "replay"};
   sonde_json_out out, status;
   if (!begin(&out, "exam")) return;
   if (!begin(&status, NULL)) {
@@ -277,7 +280,7 @@ void exam_app_tell_exam(exam_app *app) {
     put_null(&out, "result");
   }
   put_comments(&out, of ? &of->comments : NULL);
-
+  exam_app_put_lesson(app, full || hinted, &out);
   // A teacher's overview.
   sonde_json_put_text(&status, "trainee", app->trainee);
   sonde_json_put_text(&status, "phase", PHASES[app->phase]);

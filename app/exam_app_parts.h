@@ -7,6 +7,8 @@
 
 #include <pthread.h>
 
+typedef struct exam_film exam_film; // exam_app_lesson.h
+
 enum {
   EXAM_PATH = 4096,
   EXAM_ALIAS = 24,
@@ -23,7 +25,8 @@ typedef enum exam_phase {
   EXAM_PREPARING,
   EXAM_RUNNING,
   EXAM_DONE,
-  EXAM_REPLAY
+  EXAM_REPLAY,
+  EXAM_FILM
 } exam_phase;
 
 // Picture at half the image's size; the vein's ratio in it.
@@ -47,6 +50,8 @@ typedef struct exam {
   char id[64], directory[EXAM_PATH], trainee[164];
   sonde_case patient;
   const sonde_exam_protocol *protocol;
+  const sonde_lesson *lesson; // that it practises; NULL: none
+  uint32_t turn;              // repetition in the lesson, from 0
   char guidance[16];
   sonde_exam_setups setups;
   uint32_t part; // of the recording, from 1
@@ -62,7 +67,8 @@ typedef struct exam {
   // under the lock
   uint32_t held, turns_to; // setup in whose position the patient is; is from the next image on
   bool turns;
-  uint64_t seen_tick; // of the last image that the judge saw, in this part
+  uint64_t seen_tick;  // of the last image that the judge saw, in this part
+  sonde_snapshot seen; // of that image
   uint32_t picture_count, presses_seen;
   sonde_exam_picture picture[EXAM_PICTURES]; // owned here
   exam_picture open, closed;                 // of the press under way
@@ -77,7 +83,7 @@ typedef struct exam {
 
 // Where cases and thighs are.
 typedef struct exam_places {
-  const char *bundled, *cases, *protocols;
+  const char *bundled, *cases, *protocols, *course; // course NULL: none
 } exam_places;
 
 typedef struct exam_recovered {
@@ -122,6 +128,8 @@ struct exam_app {
   char message[EXAM_SENTENCE];
   exam *exam;          // NULL: none
   exam_replay *replay; // NULL: none
+  exam_film *film;     // NULL: none
+  sonde_course course;
   double published_s;
   bool disk_told; // that the disk does not take the recording
   double disk_told_s;
@@ -142,8 +150,8 @@ sonde_status exam_app_run_session(exam_app *app, sonde_session_def *def, const s
                                   sonde_error *error);
 sonde_status exam_app_practice(exam_app *app, sonde_error *error);
 void exam_app_end_session(exam_app *app);
-// Puts these in the place of the exam and the replay before (NULL: none), whose thighs are not
-// shown any more.
+// Puts these in the place of the exam, the replay and the demonstration before (NULL: none), whose
+// thighs are not shown any more.
 void exam_app_change(exam_app *app, exam *next, exam_replay *replay);
 void exam_app_set_phase(exam_app *app, exam_phase phase, const char *message);
 // What the page is told instead of a case's id, which may tell the truth about it: "patient-3";

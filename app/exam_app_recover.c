@@ -199,11 +199,18 @@ static sonde_status fill(exam *of, const sonde_json *setup, const exam_places *p
   sonde_status status = sonde_case_parse(text, of->directory, &of->patient, error);
   if (!status) status = sonde_exam_protocol_list(places->protocols, &all, &count, error);
   while (k < count && strcmp(all[k].id, name) != 0) ++k;
-  if (!status && k == count)
+  // Else that of a lesson.
+  sonde_course course = {0};
+  if (!status && k == count && places->course)
+    status = sonde_course_load(places->course, &course, error);
+  const uint32_t lesson = sonde_course_find(&course, name);
+  const bool taught = k == count && lesson < course.count;
+  if (!status && k == count && !taught)
     status = app_error(error, SONDE_NOT_FOUND, "%.300s: there is no protocol '%s' any more",
                        of->directory, name);
-  if (!status) *protocol = all[k];
+  if (!status) *protocol = taught ? course.lesson[lesson].protocol : all[k];
   sonde_free(all);
+  sonde_course_clear(&course);
   of->protocol = protocol;
   if (!status) status = exam_prepare(of, places->bundled, places->cases, NULL, error);
 

@@ -19,6 +19,7 @@ exam_library exam_library_find(const char *cases, const char *protocols) {
   char searched[1024];
   directory_of(cases, "cases", library.cases, sizeof library.cases);
   directory_of(protocols, "protocols", library.protocols, sizeof library.protocols);
+  directory_of(NULL, "course", library.course, sizeof library.course);
   library.has_bundled =
       app_bundled_model(library.bundled, sizeof library.bundled, searched, sizeof searched);
   return library;

@@ -6,7 +6,7 @@
 
 // Where cases and protocols come from.
 typedef struct exam_library {
-  char cases[1100], protocols[1100], bundled[1024];
+  char cases[1100], protocols[1100], course[1100], bundled[1024];
   bool has_bundled;
 } exam_library;
 

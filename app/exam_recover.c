@@ -27,7 +27,7 @@ int exam_recover(const exam_library *library, const char *directory, bool json) 
   sonde_error error = {0};
   recovery r = {.directory = directory,
                 .places = {library->has_bundled ? library->bundled : NULL, library->cases,
-                           library->protocols}};
+                           library->protocols, library->course[0] ? library->course : NULL}};
   exam_app_path(path, directory, "exams.sqlite");
   if (sonde_exam_log_open(path, &r.log, &error)) return app_fail("exam", &error);
   exam_recover_log(directory, r.log, &r.found);

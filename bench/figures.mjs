@@ -62,6 +62,11 @@ const FLOW_LEGS = [['29', 'female', '19.5'], ['3', 'male', '24'], ['7', 'female'
 
 // What a group measures: the sources that its figures depend on, and its values by name.
 const GROUPS = {
+  // Bars of the lessons, and scripted learners who look for the views of their places.
+  course: {
+    sources: ['src/sonde-exam/trainer/learner.c', 'src/sonde-exam/trainer/picture.c', 'data/course'],
+    measure: bin => ({ search: json(bin, 'course', '--search', '--learners', '20'), lessons: json(bin, 'course') }),
+  },
   fit: {
     sources: ['src/sonde-fit/fit', ...engine, 'data/thigh'],
     measure(bin) {
@@ -349,6 +354,15 @@ const fixed = (value, decimals) => value.toLocaleString('en-US', { minimumFracti
 
 // What the blocks of the documents show, from the groups' values; undefined where a group is not measured.
 const BLOCKS = {
+  course_search({ course }) {
+    const name = { full: 'full', hints: 'names alone', exam: 'none' }
+    return table(['guidance', 'found', 'path, median', '90 %', 'ticks of 1 ms, median', '90 %'],
+      Object.entries(course.search).map(([level, e]) => [name[level], `${e.found} of ${e.searches}`, `${fixed(e.path_mm, 0)} mm`, `${fixed(e.path_p90_mm, 0)} mm`, fixed(e.ticks, 0), fixed(e.ticks_p90, 0)]))
+  },
+  course_bars({ course }) {
+    return table(['lesson', 'places', 'runs', 'expert, score', 'time', 'path', 'bar'],
+      Object.values(course.lessons).map(l => [l.title, l.places, l.runs, `${fixed(l.score_mean, 1)} ± ${fixed(l.score_sd, 1)}`, `${fixed(l.time_mean_s, 1)} s`, `${fixed(l.path_mean_mm, 0)} mm`, fixed(l.bar, 0)]))
+  },
   learner({ learner }) {
     const share = value => value.toFixed(2)
     return ['| pictures that the learner saw | episodes that reach the vein |', '|---|---|',

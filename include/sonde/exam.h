@@ -128,6 +128,8 @@ typedef struct sonde_snapshot {
   uint32_t crossing_count;
   sonde_vein_crossing crossing[SONDE_VEIN_CROSSINGS]; /**< [crossing_count] other veins, in the
                                                          order of the vessels */
+  uint32_t view_count;
+  sonde_vessel_view view[SONDE_VESSEL_VIEWS]; /**< [view_count] what the picture has of vessels */
   double gel_volume_m3; /**< on the skin; NaN while the controls' gel is off */
   double gel_coupling;  /**< mean over the lines of the image, 0..1; likewise */
   double venous_pressure_pa, arterial_pressure_pa; /**< in the vessels */

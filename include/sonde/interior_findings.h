@@ -55,6 +55,17 @@ SONDE_API sonde_status sonde_interior_set_findings(sonde_interior *interior,
                                                    const sonde_findings *findings,
                                                    sonde_error *error);
 
+enum { SONDE_VESSEL_VIEWS = 32 };
+/** Where a vessel is in the picture: the plane through the probe's x and z axes. */
+typedef struct sonde_vessel_view {
+  uint32_t vessel; /**< index of sonde_interior_vessel_name() */
+  bool artery;
+  double aside_m, depth_m; /**< of its middle now: along the probe's x, below the face */
+  double half_m, flat_m;   /**< half of its greater and of its smaller diameter */
+  double area_ratio;       /**< current / rest */
+  double rest_z_m;         /**< model z of that place at rest */
+} sonde_vessel_view;
+
 #ifdef __cplusplus
 }
 #endif

@@ -58,6 +58,8 @@
 #include "sonde/trainer_protocol.h"
 #include "sonde/trainer_judge.h"
 #include "sonde/trainer_operator.h"
+#include "sonde/trainer_course.h"
+#include "sonde/trainer_picture.h"
 #include "sonde/trainer_log.h"
 #include "sonde/trainer_worksheet.h"
 #include "sonde/trainer_report.h"

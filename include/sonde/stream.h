@@ -34,11 +34,14 @@ typedef enum sonde_page_ask {
   SONDE_PAGE_FINISH_EXAM,
   SONDE_PAGE_LEAVE_EXAM,
   SONDE_PAGE_LIST_EXAMS,
-  SONDE_PAGE_OPEN_REPLAY, /**< id (exam) */
-  SONDE_PAGE_SEEK,        /**< time_s */
-  SONDE_PAGE_PLAY,        /**< playing, speed */
-  SONDE_PAGE_COMMENT,     /**< time_s, text, name (author) */
-  SONDE_PAGE_WORKSHEET,   /**< entry */
+  SONDE_PAGE_OPEN_REPLAY,  /**< id (exam) */
+  SONDE_PAGE_SEEK,         /**< time_s */
+  SONDE_PAGE_PLAY,         /**< playing, speed */
+  SONDE_PAGE_COMMENT,      /**< time_s, text, name (author) */
+  SONDE_PAGE_WORKSHEET,    /**< entry */
+  SONDE_PAGE_START_LESSON, /**< id (lesson), turn, name (trainee) */
+  SONDE_PAGE_DEMONSTRATE,  /**< id (lesson) */
+  SONDE_PAGE_NEXT,         /**< of a demonstration: its words are read */
   SONDE_PAGE_ASKS
 } sonde_page_ask;
 
@@ -47,6 +50,7 @@ typedef struct sonde_page_request {
   sonde_page_ask ask;
   char id[64], protocol[64], guidance[16], name[164], text[1604]; /**< UTF-8 */
   double time_s, speed;
+  uint32_t turn; /**< repetition of the lesson's practice, from 0 */
   bool playing;
   /** The whole message: one JSON object of at most 3 levels, of which nothing else was checked. */
   char entry[SONDE_PAGE_ENTRY];

@@ -17,6 +17,20 @@ SONDE_API const char *const *sonde_operator_names(void);
 
 typedef struct sonde_operator sonde_operator;
 
+/** What an operator does. */
+typedef enum sonde_operator_phase {
+  SONDE_OPERATOR_TRAVEL, /**< to a place, and aims there */
+  SONDE_OPERATOR_PRESS,
+  SONDE_OPERATOR_HOLD, /**< the press has come to its end */
+  SONDE_OPERATOR_RELEASE,
+  SONDE_OPERATOR_TURN, /**< the patient has to take another position */
+  SONDE_OPERATOR_DONE
+} sonde_operator_phase;
+/** @param[out] place of the plan; its count when done @param[out] attempt at it, from 0
+ *  @thread owner */
+SONDE_API sonde_operator_phase sonde_operator_doing(const sonde_operator *op, uint32_t *place,
+                                                    uint32_t *attempt);
+
 /** @param device filled with the operator's hand, moved into a session; it may be destroyed before
  *    or after the operator
  *  @param map,plan copied

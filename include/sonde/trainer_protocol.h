@@ -112,11 +112,16 @@ typedef struct sonde_exam_setups {
 } sonde_exam_setups;
 
 /** The case in every position that the protocol's places ask for and the patient can take (a place
- *  that asks for another is examined as the patient lies at first), and the plan with its forces.
- *  About 1.5 s of a core's time for each position beside that of sonde_plan_find_targets().
+ *  that asks for another is examined as the patient lies at first), and the plan without its
+ * forces. About 1.5 s of a core's time for each position.
  *  @param bundled,directory as of sonde_case_build()
  *  @param[out] setups released by sonde_exam_setups_clear()
- *  @return as sonde_case_build(), sonde_plan_make(), sonde_plan_find_targets() @thread owner */
+ *  @return as sonde_case_build(), sonde_plan_make() @thread owner */
+SONDE_API sonde_status sonde_exam_lay(const sonde_case *from, const sonde_exam_protocol *protocol,
+                                      const char *bundled, const char *directory,
+                                      sonde_exam_setups *setups, sonde_plan *plan,
+                                      sonde_error *error);
+/** The same with the forces. @return also as sonde_plan_find_targets() @thread owner */
 SONDE_API sonde_status sonde_exam_prepare(const sonde_case *from,
                                           const sonde_exam_protocol *protocol, const char *bundled,
                                           const char *directory, const sonde_progress *progress,

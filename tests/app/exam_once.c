@@ -3,7 +3,7 @@
 // exam_once notes FILE: how many decisions a journal has.
 // Environment: EXAM_ONCE_DIR, _MODEL, _CASES, _PROTOCOLS, _SECONDS, _ROOM_AFTER (the program goes
 // on so long with a result that is not on the disk).
-#include "exam_app_parts.h"
+#include "exam_app_lesson.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -98,6 +98,39 @@ static int examine(exam_app *app) {
   return is_kept(app) ? APP_OK : APP_FAILED;
 }
 
+// A lesson as the page would have it: the demonstration to its end, each step's words on a line,
+// then its practice.
+static int teach(exam_app *app) {
+  char words[EXAM_WORDS] = "";
+  sonde_error error = {0};
+  const char *lesson = app->course.lesson[0].protocol.id;
+  if (exam_film_open(app, lesson, &error)) {
+    fprintf(stderr, "exam_once: %s\n", error.message);
+    return APP_FAILED;
+  }
+  const uint64_t before = sonde_session_ticks(app->film->session);
+  turn_for(app, 0.2); // it waits for the learner to begin
+  printf("waits: %s\n", sonde_session_ticks(app->film->session) == before ? "yes" : "no");
+  ask(app, &(sonde_page_request){.ask = SONDE_PAGE_PLAY, .playing = true, .speed = 4});
+  for (int k = 0; k < 20000 && !(app->film && app->film->over); ++k) {
+    turn_for(app, 0);
+    if (strcmp(words, app->film->words) == 0) continue;
+    snprintf(words, sizeof words, "%s", app->film->words);
+    printf("words: %s\n", words);
+    ask(app, &(sonde_page_request){.ask = SONDE_PAGE_NEXT});
+  }
+  sonde_page_request request = {.ask = SONDE_PAGE_START_LESSON, .turn = 7, .name = "Tester"};
+  snprintf(request.id, sizeof request.id, "%s", lesson);
+  if (exam_start(app, &request, &error)) {
+    fprintf(stderr, "exam_once: %s\n", error.message);
+    return APP_FAILED;
+  }
+  printf("practises: %s, repetition %u, %s, film %s\n", app->exam->protocol->id,
+         app->exam->turn + 1, app->exam->guidance, app->film ? "goes on" : "is over");
+  exam_finish(app, &error);
+  return APP_OK;
+}
+
 static int run(void) {
   sonde_error error = {0};
   sonde_model *model = NULL;
@@ -109,6 +142,7 @@ static int run(void) {
                       .model_path = setting("EXAM_ONCE_MODEL"),
                       .cases = setting("EXAM_ONCE_CASES"),
                       .protocols = setting("EXAM_ONCE_PROTOCOLS"),
+                      .course = getenv("EXAM_ONCE_COURSE"),
                       .exams = setting("EXAM_ONCE_DIR"),
                       .start = model->sites[0],
                       .trainee = "Tester",
@@ -116,7 +150,7 @@ static int run(void) {
                       .make_device = make_device,
                       .device_name = "script"};
   int code = APP_FAILED;
-  if (!exam_app_create(&def, &app, &error)) code = examine(app);
+  if (!exam_app_create(&def, &app, &error)) code = def.course ? teach(app) : examine(app);
   sonde_error late = {0};
   if (exam_app_destroy(app, &late)) code = app_fail("run", &late);
   if (!app) code = app_fail("run", &error);

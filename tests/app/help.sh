@@ -22,6 +22,7 @@ declare -A options=(
   [validate]="--quick --pressing --sites --json"
   [exam]="--case --protocol --operator --seed --compare -o --json"
   [scanner]="--model --evaluations --from -o --json"
+  [course]="--measure --runs --lesson -o --json"
   [cases]="--check --generate --level -o --json"
   [doppler]="--vessel --squeeze-s --valsalva-s --clot --leak --angle-deg --csv -o --json"
   [devices]="--probe --json"

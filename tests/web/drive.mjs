@@ -20,6 +20,13 @@ export const addressOf = (at, query = "") => `${at.origin}${query}#${at.token}`;
 
 export const ready = (page) => page.waitForFunction(() => (window.sonde?.frames ?? 0) > 2 && window.sonde.exam !== null);
 
+/** From the course to the single exams of the start, where there is a course. */
+export async function singleExams(page) {
+  await page.locator("#start[open]").waitFor();
+  const tab = page.locator("#tab-exams");
+  if (await tab.isVisible()) await tab.click();
+}
+
 /** Puts the probe, lifted, onto the target by dragging there. */
 export async function goTo(page) {
   await page.waitForFunction(() => window.sonde.exam.step.target !== null);

@@ -6,7 +6,7 @@ import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync } f
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, turnAcross, turnPatient } from "./drive.mjs";
+import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, singleExams, turnAcross, turnPatient } from "./drive.mjs";
 import { FEW_IMAGES, onePlace, startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -32,6 +32,7 @@ const until = (page, condition, argument) => page.waitForFunction(condition, arg
 async function begin(page, guidance) {
   const again = page.getByRole("button", { name: "Start an exam", exact: true });
   if (!(await page.locator("#start").isVisible())) await again.click();
+  await singleExams(page);
   await page.locator("#trainee").fill("Test learner");
   await page.getByRole("radio", { name: guidance }).check();
   await page.locator("#start-go").click();

@@ -6,7 +6,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
+import { addressOf, browserPath, openBrowser, PATIENCE_MS, ready, singleExams } from "./drive.mjs";
 import { FEW_IMAGES, onePlace, startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -109,6 +109,7 @@ async function main() {
   const browser = await openBrowser(chromium);
   const errors = [];
   const learner = await visit(browser, running.learner, errors);
+  await singleExams(learner);
   await learner.locator("#trainee").fill("Test learner");
   await learner.locator("#start-go").click();
   const [watcher, teacher] = await Promise.all([visit(browser, running.learner, errors), visit(browser, running.teacher, errors)]);

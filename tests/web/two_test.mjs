@@ -9,7 +9,7 @@ import { createRequire } from "node:module";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
+import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready, singleExams } from "./drive.mjs";
 import { FEW_IMAGES, onePlace } from "./program.mjs";
 import { Client } from "./socket.mjs";
 
@@ -74,6 +74,7 @@ async function visit(browser, at, errors) {
 }
 
 async function begin(page, guidance, which) {
+  await singleExams(page);
   await page.locator(".cards.case .card").nth(which).click();
   await page.getByRole("radio", { name: guidance }).check();
   await page.locator("#start-go").click();

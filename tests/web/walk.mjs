@@ -4,7 +4,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, openBrowser, PATIENCE_MS, ready, turnAcross, turnPatient } from "./drive.mjs";
+import { addressOf, openBrowser, PATIENCE_MS, ready, turnAcross, turnPatient, singleExams } from "./drive.mjs";
 import { startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2, 5).map((p) => resolve(p));
@@ -69,6 +69,7 @@ async function pressSlowly(name) {
 }
 
 await shot("start");
+await singleExams(page);
 await page.locator("#start-go").click();
 await page.waitForFunction(() => ["preparing", "running"].includes(window.sonde.exam?.phase)); // a quick one is not seen to prepare
 await shot("started");

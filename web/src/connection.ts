@@ -95,6 +95,15 @@ export class Connection {
   startExam(wish: ExamWish): void {
     this.send({ type: "start_exam", ...wish });
   }
+  startLesson(lesson: string, turn: number, trainee: string): void {
+    this.send({ type: "start_lesson", lesson, turn, trainee });
+  }
+  demonstrate(lesson: string): void {
+    this.send({ type: "demonstrate", lesson });
+  }
+  next(): void {
+    this.send({ type: "next" });
+  }
   decide(segment: string, decision: Decision): void {
     this.send({ type: "decide", segment, decision });
   }

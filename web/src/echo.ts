@@ -5,7 +5,8 @@ import { Calipers, type Tool } from "./calipers";
 import { label, make } from "./dom";
 import { DopplerBox, paintColour } from "./duplex";
 import { GateOverlay } from "./gate";
-import type { Controls, Frame } from "./protocol";
+import { PictureGuide } from "./guide";
+import type { Controls, Frame, Picture } from "./protocol";
 
 const RULER_PX = 40;
 const CURVE_PX = 26; // gain over depth, left of the image
@@ -30,6 +31,7 @@ class Pane {
   readonly calipers: Calipers;
   readonly doppler = new DopplerBox();
   readonly gate = new GateOverlay();
+  readonly guide = new PictureGuide();
   width_mm = 60;
   height_mm = 70;
   private readonly image: CanvasRenderingContext2D;
@@ -40,7 +42,7 @@ class Pane {
     this.image = context(this.canvas);
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", name);
-    this.root.append(this.canvas, this.doppler.svg, this.gate.svg, this.calipers.svg, this.title);
+    this.root.append(this.canvas, this.doppler.svg, this.gate.svg, this.guide.svg, this.calipers.svg, this.title);
   }
 
   /** True when the size in millimetres changed. */
@@ -78,6 +80,7 @@ class Pane {
     this.calipers.layout(this.width_mm, this.height_mm, scale);
     this.doppler.layout(this.width_mm, this.height_mm, scale);
     this.gate.layout(this.width_mm, this.height_mm, scale);
+    this.guide.layout(this.width_mm, this.height_mm, scale);
   }
 }
 
@@ -113,6 +116,10 @@ export class EchoView {
   }
   get gate(): GateOverlay {
     return this.live.gate;
+  }
+  /** Names and ways of a live picture; a frozen one keeps its own. */
+  point(picture: Picture | null): void {
+    if (!this.frozen || !picture) this.live.guide.show(picture);
   }
   get isFrozen(): boolean {
     return this.frozen;

@@ -7,6 +7,7 @@ import { Dial } from "./dial";
 import { announce, find, label, minutes, press, pressed, recall, release, remember } from "./dom";
 import { Duplex } from "./duplex";
 import { EchoView } from "./echo";
+import { FilmBar } from "./film";
 import { ExamBar } from "./exam";
 import { ForceBar } from "./force_bar";
 import { GateTools } from "./gate";
@@ -74,6 +75,7 @@ class App {
   private readonly examBar: ExamBar;
   readonly worksheet: Worksheet;
   private readonly replayBar: ReplayBar;
+  private readonly filmBar: FilmBar;
   private readonly start: StartDialog;
   private readonly result: ResultDialog;
   private readonly history: HistoryDialog;
@@ -107,7 +109,7 @@ class App {
       decide: (segment, decision) => connection.decide(segment, decision),
       write: (segment, decision) => this.worksheet.write(segment, decision),
       chosen: (segment) => this.worksheet.chosen(segment),
-      gaps: () => this.worksheet.gaps(),
+      gaps: () => (this.exam?.lesson ? "" : this.worksheet.gaps()),
       hint: () => connection.hint(),
       finish: () => connection.finishExam(),
       leave: () => connection.leaveExam(),
@@ -126,8 +128,18 @@ class App {
       comment: (time_s, text, author) => connection.comment(time_s, text, author),
       leave: () => connection.leaveExam(),
     });
-    this.start = new StartDialog((wish) => connection.startExam(wish), () => find("scene").focus());
+    this.start = new StartDialog((wish) => connection.startExam(wish), () => find("scene").focus(), {
+      watch: (lesson) => connection.demonstrate(lesson),
+      practise: (lesson, turn) => connection.startLesson(lesson, turn, this.start.trainee),
+    });
+    this.filmBar = new FilmBar({
+      play: (playing, speed) => connection.play(playing, speed),
+      next: () => connection.next(),
+      leave: (lesson) => (connection.leaveExam(), this.start.teach(lesson)),
+    });
     this.result = new ResultDialog({
+      lesson: (id) => (this.result.hide(), connection.leaveExam(), this.start.teach(id)),
+      repeat: (id, turn) => (this.result.hide(), connection.startLesson(id, turn, this.start.trainee)),
       replay: (exam) => (this.result.hide(), connection.openReplay(exam)),
       again: (id) => (this.result.hide(), this.start.again(id)),
       next: (id) => (this.result.hide(), connection.leaveExam(), this.start.open(this.start.next(id))),
@@ -168,7 +180,8 @@ class App {
     press("stop", () => this.connection.stop());
     press("resume", () => this.connection.resume());
     press("help-button", () => find<HTMLDialogElement>("help").showModal());
-    press("start-button", () => this.start.open());
+    press("start-button", () => (remember("start", "exams"), this.start.open()));
+    press("course-button", () => this.start.teach(""));
     press("exams-button", () => this.openHistory());
     press("role-button", () => this.controls?.may && this.connection.role(this.controls.may));
     press("status", () => this.rates.toggle());
@@ -190,6 +203,7 @@ class App {
   private key(code: string, shift: boolean): boolean {
     if (code === "KeyI") this.rates.toggle();
     else if (code === "Digit0" && this.hands) this.setDepth(EASED_MM);
+    else if (this.phase === "film" && this.controls?.controls && this.filmBar.key(code)) return true;
     else if (this.phase === "replay" && this.controls?.controls && this.replayBar.key(code, shift)) return true;
     else if (this.worksheet.key(code, shift)) return true;
     else return this.gateTools.key(code, shift) || this.duplex.key(code, shift) || this.tools.key(code) || this.examBar.key(code, shift) || this.patient.key(code, shift);
@@ -223,6 +237,7 @@ class App {
     this.start.greet(hello);
     this.forceBar.limits(hello.force_limit_n, hello.comfort_n ?? COMFORT * hello.force_limit_n);
     find("start-button").hidden = find("exams-button").hidden = !hello.trainer;
+    find("course-button").hidden = !this.start.course.any;
     this.showMode();
   }
 
@@ -287,8 +302,14 @@ class App {
     if (exam.phase === "running" && before !== "running") this.begin(before);
     if (exam.phase === "practice" && exam.message && before !== "practice") this.say(exam.message, 8000);
     if (exam.phase === "running" || exam.phase === "done") this.examBar.show(exam, this.controls?.controls ?? false);
+    this.start.course.see(exam);
+    if (exam.phase === "film" && before !== "film") this.filming();
+    if (exam.phase === "film") this.filmBar.show(exam, this.controls?.controls ?? false);
+    else this.filmBar.leave();
+    this.echo.point(exam.picture ?? null);
     this.patient.turns(exam);
     this.worksheet.show(exam, this.controls?.controls ?? false);
+    if (exam.lesson) find("sheet-bar").hidden = true; // a lesson is about one thing
     if (exam.phase === "done") this.result.show(exam, this.controls?.controls ?? false, this.comments);
     else this.result.hide();
     if (exam.phase !== "replay") this.replayBar.leave();
@@ -306,6 +327,13 @@ class App {
     find("hint").classList.add("gone");
     const s = this.snapshot;
     if (before === "practice" && s && s.penetration_mm > 0) this.hold.adopt(s.position_mm, s.rotation, s.penetration_mm);
+    find("scene").focus();
+  }
+
+  private filming(): void {
+    this.start.close();
+    this.traces.clear();
+    find("hint").classList.add("gone");
     find("scene").focus();
   }
 
@@ -381,7 +409,7 @@ class App {
   /** This page's hand moves the probe: not when watching, with another device, or in a replay. */
   private get hands(): boolean {
     const device = this.hello?.device ?? "page";
-    return this.isLive && (this.controls?.controls ?? false) && device === "page" && this.phase !== "replay" && this.phase !== "preparing";
+    return this.isLive && (this.controls?.controls ?? false) && device === "page" && this.phase !== "replay" && this.phase !== "film" && this.phase !== "preparing";
   }
 
   private showMode(): void {
@@ -390,7 +418,8 @@ class App {
     const judged = phase === "running" || phase === "preparing"; // nothing may tell the truth
     const guidance = this.exam?.guidance ?? "full";
     document.body.dataset.phase = phase;
-    find("practice-bar").hidden = examining || phase === "replay";
+    find("practice-bar").hidden = examining || phase === "replay" || phase === "film";
+    find("film-bar").hidden = phase !== "film";
     find("exam-bar").hidden = !examining;
     find("replay-bar").hidden = phase !== "replay";
     find("comments").hidden = !this.comments;
@@ -418,8 +447,9 @@ class App {
     const exam = this.exam;
     const own = exam !== null && phase !== "practice" && exam.title !== "";
     const played = phase === "replay" ? (this.replay?.title ?? "") : "";
-    find("case-title").textContent = own ? exam.title : played || label(this.hello?.model ?? "");
-    find("case-history").textContent = own ? exam.history : played ? "" : "A simulated leg, to practise on";
+    const shown = phase === "film" ? this.hello?.course?.find((l) => l.id === exam?.lesson?.id) : undefined;
+    find("case-title").textContent = own ? exam.title : shown?.title || played || label(this.hello?.model ?? "");
+    find("case-history").textContent = own ? exam.history : shown ? shown.patient : played ? "" : "A simulated leg, to practise on";
     find("case").title = find("case-history").textContent ?? "";
     this.showRole();
     const device = this.hello?.device ?? "page";

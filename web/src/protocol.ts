@@ -47,6 +47,7 @@ export interface Hello {
   comfort_n?: number;
   /** of a whole limb */
   limb?: LimbInfo;
+  course?: Lesson[];
 }
 
 export interface LimbInfo {
@@ -136,7 +137,7 @@ export type Posture = "supine" | "sitting" | "standing";
 export type Guidance = "full" | "hints" | "exam";
 export type Decision = "" | "compressible" | "clot" | "not_seen";
 export type PressResult = "complete" | "open" | "too_hard" | "off_axis" | "insufficient";
-export type Phase = "practice" | "preparing" | "running" | "done" | "replay";
+export type Phase = "practice" | "preparing" | "running" | "done" | "replay" | "film";
 
 export interface Target {
   name: string;
@@ -232,6 +233,86 @@ export interface Exam {
   result: Result | null;
   // version 3
   comments?: Comment[];
+  /** that is practised or demonstrated */
+  lesson?: LessonState | null;
+  picture?: Picture | null;
+  film?: Film | null;
+}
+
+/** What the expert came to, and what is asked of a learner. */
+export interface Bar {
+  score: number;
+  mean: number;
+  sd: number;
+  runs: number;
+  time_s: number;
+  path_mm: number;
+  force_n: number;
+}
+
+export interface LessonState {
+  id: string;
+  /** repetition, from 0, and how many there are */
+  turn: number;
+  turns: number;
+  bar: Bar | null;
+  reached: boolean;
+}
+
+export interface PictureMark {
+  kind: "vein" | "artery" | "lesion";
+  name: string;
+  /** what is seen of it and why; empty: nothing now */
+  why: string;
+  wanted: boolean;
+  /** of its middle, from the middle of the face and below it */
+  x_mm: number;
+  depth_mm: number;
+  /** half of its greater and of its smaller diameter */
+  half_mm: number;
+  flat_mm: number;
+}
+
+/** Guidance in the picture. */
+export interface Picture {
+  marks: PictureMark[];
+  /** the way to the view, along the picture's x and along the probe's y; null: none */
+  aside_mm: number | null;
+  along_mm: number | null;
+  way: string;
+}
+
+/** A demonstration. */
+export interface Film {
+  title: string;
+  words: string;
+  playing: boolean;
+  /** waits while the words are read */
+  reading: boolean;
+  over: boolean;
+  speed: number;
+  place: number;
+  places: number;
+}
+
+export interface Question {
+  ask: string;
+  choices: string[];
+  right: number;
+  why: string;
+}
+
+export interface Lesson {
+  id: string;
+  title: string;
+  goal: string;
+  /** the patient's history; empty: drawn anew each time */
+  patient: string;
+  places: number;
+  /** guidance of each repetition */
+  practice: Guidance[];
+  quiz: Question[];
+  bar: Bar | null;
 }
 
 export interface ExamEntry {

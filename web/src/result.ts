@@ -10,6 +10,9 @@ export interface ResultActions {
   again(caseId: string): void;
   next(caseId: string): void;
   close(): void;
+  /** back to a lesson; its practice once more */
+  lesson(id: string): void;
+  repeat(id: string, turn: number): void;
   comment(): void;
   /** of the worksheet; null: none was written */
   worksheet(): HTMLElement | null;
@@ -75,6 +78,15 @@ function parts(list: ScorePart[]): HTMLElement {
   return table;
 }
 
+/** The result beside the lesson's bar. */
+function barWords(exam: Exam): HTMLElement {
+  const { bar, reached } = exam.lesson!;
+  const box = make("p", `bar-result ${reached ? "good" : "warn"}`);
+  const alone = exam.guidance === "exam" ? "" : " It counts in the repetition without help.";
+  box.append(make("b", "", reached ? "The bar is reached. " : "Below the bar. "), `${bar!.score} points and the right diagnosis are asked for; the expert came to ${bar!.mean.toFixed(1)} ± ${bar!.sd.toFixed(1)} in ${bar!.runs} examinations.${alone}`);
+  return box;
+}
+
 export class ResultDialog {
   private readonly box = find<HTMLDialogElement>("result");
   private shown = "";
@@ -101,9 +113,10 @@ export class ResultDialog {
     const top = make("div", "top");
     top.append(ring(result), words);
     const body: HTMLElement[] = [top, this.diagnosis(result)];
+    if (exam.lesson?.bar) body.push(barWords(exam));
     if (result.note) body.push(make("p", "note", result.note));
     if (result.parts) body.push(parts(result.parts));
-    const sheet = this.actions.worksheet();
+    const sheet = exam.lesson ? null : this.actions.worksheet();
     if (sheet) body.push(sheet);
     this.box.replaceChildren(...body, segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls, comments));
     if (!this.box.open) this.box.showModal();
@@ -122,10 +135,11 @@ export class ResultDialog {
     const row = make("div", "actions");
     const report = make("a", "primary button", "Open the report");
     Object.assign(report, { href: result.report, target: "_blank", rel: "noopener" });
+    const l = exam.lesson;
     const later = [
       button("Watch the replay", () => this.actions.replay(exam.exam)),
-      button("Try again", () => this.actions.again(exam.case)),
-      button("Next case", () => this.actions.next(exam.case)),
+      button("Try again", () => (l ? this.actions.repeat(l.id, l.turn) : this.actions.again(exam.case))),
+      l ? button("On with the lesson", () => this.actions.lesson(l.id)) : button("Next case", () => this.actions.next(exam.case)),
     ];
     later[0]!.disabled = !exam.recording;
     for (const b of later) b.disabled ||= !controls;

@@ -3,6 +3,7 @@
 import type { ExamWish } from "./connection";
 import { button, find, make, recall, remember } from "./dom";
 import type { CaseInfo, Guidance, Hello } from "./protocol";
+import { CourseView, type CourseActions } from "./course";
 import { GUIDANCE, LEVELS } from "./words";
 
 interface Choice {
@@ -33,11 +34,24 @@ export class StartDialog {
   private hello: Hello | null = null;
   private wish: ExamWish = { case: "", protocol: "", guidance: "full", trainee: "" };
   private readonly box = find<HTMLDialogElement>("start");
+  private taught = true; // the course is in view
+  readonly course: CourseView;
 
   constructor(
     private readonly start: (wish: ExamWish) => void,
     private readonly practise: () => void,
-  ) {}
+    teach: Omit<CourseActions, "changed">,
+  ) {
+    this.course = new CourseView({
+      watch: (lesson) => teach.watch(lesson),
+      practise: (lesson, turn) => teach.practise(lesson, turn),
+      changed: () => this.hello && this.build(this.hello),
+    });
+  }
+
+  get trainee(): string {
+    return this.wish.trainee;
+  }
 
   get isOpen(): boolean {
     return this.box.open;
@@ -65,14 +79,28 @@ export class StartDialog {
       guidance: (recall("guidance") as Guidance) || "full",
       trainee: hello.trainee || recall("trainee"),
     };
+    this.course.greet(hello.course ?? [], this.wish.trainee);
   }
 
   open(caseId?: string): void {
     if (!this.hello?.trainer || this.box.open) return;
     if (caseId) this.wish.case = caseId;
+    this.taught = this.course.any && !caseId && recall("start") !== "exams";
     this.build(this.hello);
     this.box.showModal();
     find<HTMLButtonElement>("start-go").focus();
+    this.reveal();
+  }
+
+  /** Opens the course at a lesson, or at the next one. */
+  teach(lesson: string): void {
+    if (!this.hello || this.box.open) return;
+    this.course.choose(lesson);
+    remember("start", "course");
+    this.open();
+  }
+
+  private reveal(): void {
     this.box.querySelector(".cards.case input:checked")?.closest(".card")?.scrollIntoView({ block: "nearest" });
   }
 
@@ -83,8 +111,41 @@ export class StartDialog {
   }
 
   private build(hello: Hello): void {
+    const focused = (document.activeElement as HTMLElement | null)?.id || (document.activeElement instanceof HTMLInputElement ? `${document.activeElement.name}=${document.activeElement.value}` : "");
+    if (this.taught) this.box.replaceChildren(this.head(), this.course.build(), this.foot());
+    else this.exams(hello);
+    if (!this.box.open) return;
+    // Who came by keyboard stays where he was.
+    const [name, value] = focused.split("=");
+    const same = value === undefined ? document.getElementById(focused) : this.box.querySelector<HTMLElement>(`input[name="${name}"][value="${value}"]`);
+    (same ?? find("start-go")).focus();
+    this.reveal();
+  }
+
+  private head(): HTMLElement {
+    const row = make("div", "start-head");
     const head = make("h2", "", "What do you want to do?");
     head.id = "start-title";
+    row.append(head);
+    if (!this.course.any) return row;
+    const tabs = make("div", "chips");
+    tabs.setAttribute("role", "group");
+    tabs.setAttribute("aria-label", "Course or single exams");
+    for (const [id, text, taught] of [["tab-course", "Course", true], ["tab-exams", "Single exams", false]] as const) {
+      const tab = button(text, () => {
+        this.taught = taught;
+        remember("start", taught ? "course" : "exams");
+        if (this.hello) this.build(this.hello);
+      });
+      tab.id = id;
+      tab.setAttribute("aria-pressed", String(taught === this.taught));
+      tabs.append(tab);
+    }
+    row.append(tabs);
+    return row;
+  }
+
+  private exams(hello: Hello): void {
     const intro = recall("trained") ? "Choose a case, or practise freely." : "New here? Press Start: the page leads you through a first exam.";
     const cases = (hello.case_list ?? []).map((c: CaseInfo) => ({ id: c.id, title: c.title, text: c.history, tag: LEVELS[c.level] }));
     const left = cards("case", "Case", cases, this.wish.case, (id) => (this.wish.case = id));
@@ -97,7 +158,7 @@ export class StartDialog {
     );
     const columns = make("div", "columns");
     columns.append(left, right);
-    this.box.replaceChildren(head, make("p", "intro", intro), columns, this.foot());
+    this.box.replaceChildren(this.head(), make("p", "intro", intro), columns, this.foot());
   }
 
   private name(): HTMLElement {
@@ -112,14 +173,16 @@ export class StartDialog {
 
   private foot(): HTMLElement {
     const row = make("div", "actions");
-    const go = button("Start the exam", () => this.go(), "primary big");
+    const go = button(this.taught ? this.course.goWords : "Start the exam", () => this.go(), "primary big");
     go.id = "start-go";
     const free = button("Free practice", () => (this.box.close(), this.practise()));
-    row.append(free, make("span", "caption note", "No score, every vein, every setting"), make("span", "spring"), go);
+    const note = this.taught ? this.course.foot() : [make("span", "caption note", "No score, every vein, every setting")];
+    row.append(free, ...note, make("span", "spring"), go);
     return row;
   }
 
   private go(): void {
+    if (this.taught) return void (this.course.go() && this.box.close());
     remember("protocol", this.wish.protocol);
     remember("guidance", this.wish.guidance);
     remember("trainee", this.wish.trainee);

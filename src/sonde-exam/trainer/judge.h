@@ -115,4 +115,10 @@ sonde_force_target sonde_press_target(const sonde_judge *judge);
 // A press is under way within reach of no place of the plan.
 bool sonde_press_is_astray(const sonde_judge *judge);
 
+// The way from the probe to the view of a place, into a picture whose vessels are known: a vein
+// that is in it already is brought to its middle. None where there is nothing to slide.
+struct sonde_picture;
+void sonde_guide_way(const sonde_judge *judge, const sonde_plan_point *point, sonde_pose pose,
+                     struct sonde_picture *picture);
+
 #endif

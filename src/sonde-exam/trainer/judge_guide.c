@@ -1,12 +1,54 @@
 // What to do next: one sentence for the learner.
+#include "sonde/trainer_picture.h"
 #include "trainer/judge.h"
 
 #include <ctype.h>
+
+// A vein nearer to the picture's middle than this needs no way; one farther aside than the face is
+// not in it.
+static const double MIDDLE_M = 0.006, FACE_M = 0.025;
 
 // A segment of the plan whose places are done and that has no decision.
 static bool is_due(const sonde_judge *judge, uint32_t segment) {
   sonde_segment_status s = sonde_judge_segment(judge, segment);
   return s.needed && s.done == s.points && s.decision == SONDE_DECISION_NONE;
+}
+
+// Towards which end of the leg a probe that is `flat` beside a place has to go, and how far it is
+// from there along the course that points towards the knee, where the map's points come later.
+static const char *find_towards(const sonde_judge *judge, const sonde_plan_point *point,
+                                sonde_vec3 flat, double *along_m) {
+  const sonde_vein_map *map = &judge->map;
+  sonde_vec3 course = v_cross(point->at.normal, point->at.across);
+  sonde_vec3 down = v_sub(map->point[map->point_count - 1].vein_m, map->point[0].vein_m);
+  if (v_dot(down, course) < 0) course = v_neg(course);
+  *along_m = v_dot(flat, course);
+  bool calf = map->segment[point->segment].kind == SONDE_SEGMENT_CALF;
+  return *along_m < 0 ? (calf ? "foot" : "knee") : calf ? "knee" : "groin";
+}
+
+void sonde_guide_way(const sonde_judge *judge, const sonde_plan_point *point, sonde_pose pose,
+                     sonde_picture *picture) {
+  sonde_vec3 away = v_sub(pose.position, point->at.skin_m), normal = point->at.normal;
+  sonde_vec3 flat = v_madd(away, -v_dot(away, normal), normal);
+  double along_m;
+  const char *towards = find_towards(judge, point, flat, &along_m);
+  if (-v_dot(q_rotate(pose.rotation, vec3(0, 0, 1)), normal) < 0.3) return; // behind the leg
+  double aside_m = -v_dot(flat, q_rotate(pose.rotation, vec3(1, 0, 0))), nearest_m = FACE_M;
+  const bool there = fabs(along_m) <= judge->plan.criteria.reach_m;
+  for (uint32_t k = 0; k < picture->count && there; ++k) {
+    const sonde_picture_mark *mark = &picture->mark[k];
+    if (!mark->wanted || fabs(mark->aside_m) > nearest_m) continue;
+    aside_m = mark->aside_m, nearest_m = fabs(aside_m);
+  }
+  if (there && fabs(aside_m) <= MIDDLE_M) return;
+  picture->aside_m = aside_m;
+  picture->along_m = there ? 0 : -v_dot(flat, q_rotate(pose.rotation, vec3(0, 1, 0)));
+  if (there)
+    snprintf(picture->way, sizeof picture->way, "%.0f mm to this side", 1e3 * fabs(aside_m));
+  else
+    snprintf(picture->way, sizeof picture->way, "%.0f mm towards the %s", 1e3 * fabs(along_m),
+             towards);
 }
 
 // Where to go and what to do there.
@@ -24,20 +66,18 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   }
 
   // Where the probe is from the place, along the skin: what lies along the normal is the press
-  // itself. The course points towards the knee, where the map's points come later.
-  const sonde_vein_map *map = &judge->map;
+  // itself.
   sonde_pose pose = judge->last.world_from_probe;
   sonde_vec3 normal = point->at.normal, away = v_sub(pose.position, point->at.skin_m);
   sonde_vec3 flat = v_madd(away, -v_dot(away, normal), normal);
-  sonde_vec3 course = v_cross(normal, point->at.across);
-  sonde_vec3 down = v_sub(map->point[map->point_count - 1].vein_m, map->point[0].vein_m);
-  if (v_dot(down, course) < 0) course = v_neg(course);
-  double along_m = v_dot(flat, course);
+  double along_m;
+  const char *towards = find_towards(judge, point, flat, &along_m);
   // On the other side of the leg the way along the skin says nothing.
   sonde_vec3 beam = q_rotate(pose.rotation, vec3(0, 0, 1));
   const double facing = 0.3;
   bool turned = -v_dot(beam, normal) < facing;
-  double transverse = fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), course));
+  double transverse =
+      fabs(v_dot(q_rotate(pose.rotation, vec3(0, 1, 0)), v_cross(normal, point->at.across)));
   g->angle_rad = acos(fmin(transverse, 1));
   g->offset_m = v_norm(turned ? away : flat);
   g->angle_ok = g->angle_rad <= c->tilt_rad;
@@ -72,8 +112,6 @@ static void say_next(const sonde_judge *judge, sonde_guidance *g) {
   const char *move = judge->pressing ? "Not here: let go and move" : "Move";
   double across_mm = 1e3 * sqrt(fmax(0, g->offset_m * g->offset_m - along_m * along_m));
   double along_mm = fabs(1e3 * along_m);
-  bool calf = map->segment[point->segment].kind == SONDE_SEGMENT_CALF;
-  const char *towards = along_m < 0 ? (calf ? "foot" : "knee") : calf ? "knee" : "groin";
   const double steep = 0.6; // of a normal that looks to the front or the back
   if (turned)
     snprintf(g->text, sizeof g->text, "%s to the %s of the leg: %s.",

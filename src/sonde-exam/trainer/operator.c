@@ -102,8 +102,6 @@ static const double ARCH_M = 0.03, ARCH_TURNED_M = 0.05; // out of a way through
 static const double STRAINS_PA = 5 * SONDE_PA_PER_MMHG;  // above the calm pressure: wide veins
 static const double FLIGHT = 2; // speed through the air over that along the skin
 
-typedef enum phase { TRAVEL, PRESS, HOLD, RELEASE, TURN, DONE } phase; // TURN: of the patient
-
 struct sonde_operator {
   habit habit;
   sonde_vein_map map;
@@ -114,7 +112,7 @@ struct sonde_operator {
   bool visit[SONDE_PLAN_POINTS];
   uint32_t open[SONDE_SEGMENTS], closed[SONDE_SEGMENTS], unsure[SONDE_SEGMENTS];
 
-  phase phase;
+  sonde_operator_phase phase;
   uint32_t place, attempt, opens;
   double along_m, across_m, twist_rad, depth_m; // where the hand is told to be, from the place
   bool flying;                                  // through the air to the place, from `left`
@@ -224,22 +222,25 @@ static void begin_place(sonde_operator *op, uint32_t place) {
   }
   op->place = place;
   op->attempt = op->opens = 0;
-  op->phase = place >= op->plan.count ? DONE : turns ? TURN : TRAVEL;
-  if (op->phase == TRAVEL) aim(op);
+  op->phase = place >= op->plan.count ? SONDE_OPERATOR_DONE
+              : turns                 ? SONDE_OPERATOR_TURN
+                                      : SONDE_OPERATOR_TRAVEL;
+  if (op->phase == SONDE_OPERATOR_TRAVEL) aim(op);
 }
 
 uint32_t sonde_operator_wants(const sonde_operator *op) {
-  return op->phase == TURN ? op->plan.point[op->place].held : op->held;
+  return op->phase == SONDE_OPERATOR_TURN ? op->plan.point[op->place].held : op->held;
 }
 
 sonde_status sonde_operator_hold(sonde_operator *op, uint32_t held, const sonde_vein_map *map,
                                  double dt_s, sonde_device *device, sonde_error *error) {
-  SONDE_ASSERT(op && op->phase == TURN && map && device && held == sonde_operator_wants(op));
+  SONDE_ASSERT(op && op->phase == SONDE_OPERATOR_TURN && map && device &&
+               held == sonde_operator_wants(op));
   op->map = *map, op->held = held;
   op->last_s = op->along_m = op->across_m = op->twist_rad = 0;
   op->depth_m = -LIFT_M;
   op->flying = false;
-  op->phase = TRAVEL;
+  op->phase = SONDE_OPERATOR_TRAVEL;
   aim(op);
   sonde_status status = sonde_device_page(pose_at(op), dt_s, device, error);
   if (!status) op->hand = *device;
@@ -295,7 +296,7 @@ static void weigh_press(sonde_operator *op) {
   op->opens += open;
   bool clear = closed || (open && (!h->confirm || op->opens >= 2));
   if (!clear && op->attempt < h->attempts) {
-    op->phase = TRAVEL;
+    op->phase = SONDE_OPERATOR_TRAVEL;
     aim(op);
     return;
   }
@@ -318,12 +319,12 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
   double vein = (double)NAN; // how open the veins are that the place asks for
   if (op->place < op->plan.count)
     vein = sonde_segment_ratio(&op->map, op->plan.point[op->place].segment, s, NULL);
-  if (op->phase == PRESS || op->phase == HOLD) {
+  if (op->phase == SONDE_OPERATOR_PRESS || op->phase == SONDE_OPERATOR_HOLD) {
     op->ratio = fmin(op->ratio, vein);
     op->peak_n = fmax(op->peak_n, s->force_normal_n);
   }
   switch (op->phase) {
-  case TRAVEL: {
+  case SONDE_OPERATOR_TRAVEL: {
     double step = h->travel_m_s * dt_s, goal_m = op->aim_m + op->beyond_m;
     if (op->flying) {
       op->flown = fmin(1, op->flown + FLIGHT * step / op->way_m);
@@ -346,10 +347,10 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     op->sway_m = reach_m * sin(2 * SONDE_PI * 0.45 * s->time_s);
     op->sway_across_m = reach_m * sin(2 * SONDE_PI * 0.7 * s->time_s);
     bool strains = h->patient && s->venous_pressure_pa > op->calm_pa + STRAINS_PA;
-    if (op->wait_s <= 0 && !strains) op->phase = PRESS;
+    if (op->wait_s <= 0 && !strains) op->phase = SONDE_OPERATOR_PRESS;
     break;
   }
-  case PRESS: {
+  case SONDE_OPERATOR_PRESS: {
     // One look of a press, and whether it ends.
     double force_n = s->force_normal_n, speed = force_n < TOUCH_N ? h->approach_m_s : h->press_m_s;
     double stiffness = (force_n - op->felt_n) / (op->depth_m - op->felt_depth_m);
@@ -368,25 +369,33 @@ void sonde_operator_see(sonde_operator *op, const sonde_snapshot *s) {
     if (!(h->share_to > 0 || h->beyond_to_n > 0))
       ends |= vein <= h->closed_ratio || (force_n >= firm_n && vein >= h->open_ratio);
     if (!ends) break;
-    op->phase = HOLD;
+    op->phase = SONDE_OPERATOR_HOLD;
     op->wait_s = HOLD_S;
     break;
   }
-  case HOLD:
+  case SONDE_OPERATOR_HOLD:
     op->wait_s -= dt_s;
-    if (op->wait_s <= 0) op->phase = RELEASE;
+    if (op->wait_s <= 0) op->phase = SONDE_OPERATOR_RELEASE;
     break;
-  case RELEASE:
+  case SONDE_OPERATOR_RELEASE:
     op->depth_m = towards(op->depth_m, -LIFT_M, RELEASE_M_S * dt_s);
     if (op->depth_m <= -LIFT_M) weigh_press(op);
     break;
-  case TURN:
-  case DONE: break;
+  case SONDE_OPERATOR_TURN:
+  case SONDE_OPERATOR_DONE: break;
   }
-  if (op->phase != DONE && op->phase != TURN) sonde_device_page_goal(&op->hand, pose_at(op));
+  if (op->phase != SONDE_OPERATOR_DONE && op->phase != SONDE_OPERATOR_TURN)
+    sonde_device_page_goal(&op->hand, pose_at(op));
 }
 
-bool sonde_operator_done(const sonde_operator *op) { return op->phase == DONE; }
+sonde_operator_phase sonde_operator_doing(const sonde_operator *op, uint32_t *place,
+                                          uint32_t *attempt) {
+  SONDE_ASSERT(op && place && attempt);
+  *place = op->place, *attempt = op->attempt;
+  return op->phase;
+}
+
+bool sonde_operator_done(const sonde_operator *op) { return op->phase == SONDE_OPERATOR_DONE; }
 
 sonde_decision sonde_operator_decision(const sonde_operator *op, uint32_t segment) {
   SONDE_ASSERT(segment < SONDE_SEGMENTS);

@@ -12,13 +12,50 @@ sonde_criteria sonde_criteria_default(void) {
       .tilt_rad = 20 * DEGREE, .closed_ratio = 0.10, .open_ratio = 0.30, .reach_m = 0.010};
 }
 
+void sonde_read_stops(sonde_reader *reader, sonde_place root, sonde_exam_protocol *out) {
+  static const char *const PLACE[] = {"title", "text", "needs",    "segment",  "at",
+                                      "from",  "to",   "every_mm", "position", NULL};
+  sonde_place places = sonde_read_find(reader, root, "places");
+  out->stop_count = sonde_read_count(reader, places);
+  if (out->stop_count == 0 || out->stop_count > SONDE_EXAM_STOPS) {
+    sonde_reader_fail(reader, root, SONDE_FORMAT, "%u places, expected 1 to %d", out->stop_count,
+                      SONDE_EXAM_STOPS);
+    out->stop_count = 0;
+  }
+  for (uint32_t i = 0; i < out->stop_count; ++i) {
+    sonde_exam_stop *stop = &out->stop[i];
+    const sonde_place at = sonde_read_item(reader, places, i);
+    sonde_read_keys(reader, at, "a place", PLACE);
+    sonde_read_member(reader, at, "needs", false, stop->needs, sizeof stop->needs);
+    sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
+    sonde_read_member(reader, at, "segment", false, stop->segment, sizeof stop->segment);
+    stop->position = (sonde_limb_position)sonde_read_choice(
+        reader, at, "position", sonde_case_positions, SONDE_LIMB_POSITIONS);
+    sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
+    sonde_place to = sonde_read_find(reader, at, "to");
+    bool stands = one && sonde_read_find(reader, one, "station");
+    sonde_read_member(reader, at, "text", !stands, stop->text, sizeof stop->text);
+    if (stop->segment[0] && !stands)
+      sonde_reader_fail(reader, at, SONDE_FORMAT, "segment belongs to a place with a station");
+    if ((one != 0) == (from != 0) || (from != 0) != (to != 0)) {
+      sonde_reader_fail(reader, at, SONDE_FORMAT, "give either at, or from, to and every_mm");
+      continue;
+    }
+    if (one) {
+      sonde_read_station(reader, one, "at", &stop->from);
+      continue;
+    }
+    sonde_read_station(reader, from, "from", &stop->from);
+    sonde_read_station(reader, to, "to", &stop->to);
+    stop->every_m = 1e-3 * sonde_read_real(reader, at, "every_mm", 2, 200, (double)NAN);
+  }
+}
+
 sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde_exam_protocol *out,
                                        sonde_error *error) {
   SONDE_ASSERT(text && name && out);
   static const char *const KEYS[] = {"sonde_protocol", "id",     "title", "text",
                                      "criteria",       "places", NULL};
-  static const char *const PLACE[] = {"title", "text", "needs",    "segment",  "at",
-                                      "from",  "to",   "every_mm", "position", NULL};
   static const char *const CRITERIA[] = {"tilt_deg", "closed_ratio", "open_ratio", "reach_mm",
                                          NULL};
   sonde_reader *reader;
@@ -49,41 +86,7 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
                         c->open_ratio);
   }
 
-  sonde_place places = sonde_read_find(reader, root, "places");
-  out->stop_count = sonde_read_count(reader, places);
-  if (out->stop_count == 0 || out->stop_count > SONDE_EXAM_STOPS) {
-    sonde_reader_fail(reader, root, SONDE_FORMAT, "%u places, expected 1 to %d", out->stop_count,
-                      SONDE_EXAM_STOPS);
-    out->stop_count = 0;
-  }
-  for (uint32_t i = 0; i < out->stop_count; ++i) {
-    sonde_exam_stop *stop = &out->stop[i];
-    at = sonde_read_item(reader, places, i);
-    sonde_read_keys(reader, at, "a place", PLACE);
-    sonde_read_member(reader, at, "needs", false, stop->needs, sizeof stop->needs);
-    sonde_read_member(reader, at, "title", true, stop->title, sizeof stop->title);
-    sonde_read_member(reader, at, "segment", false, stop->segment, sizeof stop->segment);
-    stop->position = (sonde_limb_position)sonde_read_choice(
-        reader, at, "position", sonde_case_positions, SONDE_LIMB_POSITIONS);
-    sonde_place one = sonde_read_find(reader, at, "at"), from = sonde_read_find(reader, at, "from");
-    sonde_place to = sonde_read_find(reader, at, "to");
-    bool stands = one && sonde_read_find(reader, one, "station");
-    sonde_read_member(reader, at, "text", !stands, stop->text, sizeof stop->text);
-    if (stop->segment[0] && !stands)
-      sonde_reader_fail(reader, at, SONDE_FORMAT, "segment belongs to a place with a station");
-    if ((one != 0) == (from != 0) || (from != 0) != (to != 0)) {
-      sonde_reader_fail(reader, at, SONDE_FORMAT, "give either at, or from, to and every_mm");
-      continue;
-    }
-    if (one) {
-      sonde_read_station(reader, one, "at", &stop->from);
-      continue;
-    }
-    sonde_read_station(reader, from, "from", &stop->from);
-    sonde_read_station(reader, to, "to", &stop->to);
-    stop->every_m = 1e-3 * sonde_read_real(reader, at, "every_mm", 2, 200, (double)NAN);
-  }
-
+  sonde_read_stops(reader, root, out);
   status = sonde_reader_status(reader, error);
   sonde_reader_destroy(reader);
   return status;
@@ -231,10 +234,9 @@ sonde_status sonde_plan_make(const sonde_exam_protocol *protocol, const sonde_ve
 
 // ---- in the positions that it asks for
 
-sonde_status sonde_exam_prepare(const sonde_case *from, const sonde_exam_protocol *protocol,
-                                const char *bundled, const char *directory,
-                                const sonde_progress *progress, sonde_exam_setups *setups,
-                                sonde_plan *plan, sonde_error *error) {
+sonde_status sonde_exam_lay(const sonde_case *from, const sonde_exam_protocol *protocol,
+                            const char *bundled, const char *directory, sonde_exam_setups *setups,
+                            sonde_plan *plan, sonde_error *error) {
   SONDE_ASSERT(from && protocol && setups && plan);
   setups->count = 0;
   *plan = (sonde_plan){.criteria = protocol->criteria};
@@ -261,6 +263,15 @@ sonde_status sonde_exam_prepare(const sonde_case *from, const sonde_exam_protoco
     status = add_stop(stop, &maps, plan, error);
   }
   if (!status) status = end_plan(protocol, plan, error);
+  if (status) sonde_exam_setups_clear(setups);
+  return status;
+}
+
+sonde_status sonde_exam_prepare(const sonde_case *from, const sonde_exam_protocol *protocol,
+                                const char *bundled, const char *directory,
+                                const sonde_progress *progress, sonde_exam_setups *setups,
+                                sonde_plan *plan, sonde_error *error) {
+  sonde_status status = sonde_exam_lay(from, protocol, bundled, directory, setups, plan, error);
   if (!status) status = sonde_plan_find_targets(plan, setups->held, progress, error);
   if (status) sonde_exam_setups_clear(setups);
   return status;

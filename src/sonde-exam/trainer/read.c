@@ -1,4 +1,5 @@
-// Texts and stations of cases and protocols, and the files of a directory.
+// Texts, stations and questions of cases, protocols and lessons, and the files of a directory.
+#include "trainer/course.h"
 #include "trainer/trainer.h"
 
 #include <dirent.h>
@@ -50,6 +51,32 @@ void sonde_read_station(sonde_reader *reader, sonde_place at, const char *what,
     station->share = sonde_read_real(reader, at, "share", 0, 1, 0.5);
   }
   station->shift_m = 1e-3 * sonde_read_real(reader, at, "shift_mm", -1000, 1000, 0);
+}
+
+void sonde_read_question(sonde_reader *reader, sonde_place at, sonde_question *q) {
+  static const char *const KEYS[] = {"ask", "choices", "right", "why", NULL};
+  sonde_read_keys(reader, at, "a question", KEYS);
+  sonde_read_member(reader, at, "ask", true, q->ask, sizeof q->ask);
+  sonde_read_member(reader, at, "why", true, q->why, sizeof q->why);
+  sonde_place list = sonde_read_find(reader, at, "choices");
+  q->choice_count = sonde_read_count(reader, list);
+  if (q->choice_count < 2 || q->choice_count > SONDE_LESSON_CHOICES) {
+    sonde_reader_fail(reader, at, SONDE_FORMAT, "%u choices, expected 2 to %d", q->choice_count,
+                      SONDE_LESSON_CHOICES);
+    q->choice_count = 0;
+    return;
+  }
+  for (uint32_t i = 0; i < q->choice_count; ++i) {
+    sonde_place item = sonde_read_item(reader, list, i);
+    const char *text = sonde_read_text_at(reader, item, "a choice");
+    if (text && strlen(text) >= sizeof q->choice[i])
+      sonde_reader_fail(reader, item, SONDE_FORMAT, "a choice has %zu bytes, expected at most %zu",
+                        strlen(text), sizeof q->choice[i] - 1);
+    snprintf(q->choice[i], sizeof q->choice[i], "%s", text ? text : "");
+  }
+  q->right = sonde_read_integer(reader, at, "right", 1, q->choice_count, UINT32_MAX) - 1;
+  if (!sonde_read_find(reader, at, "right"))
+    sonde_reader_fail(reader, at, SONDE_FORMAT, "right is missing: the number of the right choice");
 }
 
 static int compare_names(const void *a, const void *b) { return strcmp(a, b); }

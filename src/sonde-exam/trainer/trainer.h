@@ -15,12 +15,20 @@ const char *sonde_segment_known(uint32_t i, sonde_segment_kind *kind);
 // The segment that a branch belongs to; NULL: none.
 const char *sonde_segment_of_branch(const char *branch);
 
+// What people call a vessel in view: "great_saphenous" is the great saphenous vein; the main ones
+// are called by the part of the leg.
+void sonde_vessel_title(const sonde_vein_map *map, const sonde_vessel_view *view, char *title,
+                        size_t size);
+
 // Copies a text of a map into a member of `size` bytes; too long a text is an error.
 void sonde_read_member(sonde_reader *reader, sonde_place map, const char *key, bool needed,
                        char *to, size_t size);
 // A place: a number of mm from the groin end, or a map with station, landmark, segment or share.
 void sonde_read_station(sonde_reader *reader, sonde_place at, const char *what,
                         sonde_station *station);
+
+// The places of a protocol or a lesson, 1 to SONDE_EXAM_STOPS of them.
+void sonde_read_stops(sonde_reader *reader, sonde_place root, sonde_exam_protocol *out);
 
 // A file of a directory that ends with .yaml is handed to `load`, which fills one item.
 typedef sonde_status (*sonde_item_load)(const char *path, void *item, sonde_error *error);

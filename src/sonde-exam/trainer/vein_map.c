@@ -2,6 +2,7 @@
 // the segments of all veins, the stations.
 #include "trainer/judge.h"
 
+#include <ctype.h>
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,6 +56,28 @@ static const struct {
      {"great_saphenous", "second_great_saphenous"}},
     {"small_saphenous", "Small saphenous vein", 0, SONDE_SEGMENT_SUPERFICIAL, {"small_saphenous"}}};
 _Static_assert(SONDE_COUNT_OF(SEGMENT) == TRAINER_SEGMENTS, "a row for each name");
+
+void sonde_vessel_title(const sonde_vein_map *map, const sonde_vessel_view *view, char *title,
+                        size_t size) {
+  SONDE_ASSERT(map && view && size > 1);
+  const char *kind = view->artery ? "artery" : "vein", *name = "";
+  const uint32_t branch = view->vessel - TRAINER_FIRST_BRANCH;
+  if (view->vessel < TRAINER_FIRST_BRANCH) {
+    const uint32_t k = sonde_vein_segment_at(map, view->rest_z_m);
+    const char *segment = k < map->segment_count ? map->segment[k].name : "";
+    name = strcmp(segment, "common_femoral") == 0 ? "common femoral"
+           : strcmp(segment, "popliteal") == 0    ? "popliteal"
+                                                  : "femoral";
+  } else if (branch < map->branch_count) {
+    name = map->branch[branch];
+  }
+  const size_t length = strlen(name), tail = strlen(kind);
+  const bool told = length >= tail && strcmp(name + length - tail, kind) == 0;
+  snprintf(title, size, "%s%s%s", name, told ? "" : " ", told ? "" : kind);
+  for (char *c = title; *c; ++c)
+    if (*c == '_') *c = ' ';
+  title[0] = (char)toupper((unsigned char)title[0]);
+}
 
 const char *sonde_segment_title(const char *name) {
   for (size_t i = 0; i < SONDE_COUNT_OF(SEGMENT); ++i)
