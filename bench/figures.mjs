@@ -122,6 +122,9 @@ const GROUPS = {
       return values
     },
   },
+  // The live solid beside the equilibrium, at three speeds to two depths.
+  ...Object.fromEntries([14, 22].map(depth => [`solid_live_${depth}`, { sources: ['src/sonde-solid', 'bench/bench_live.c', 'data/thigh'],
+    measure: bin => JSON.parse(run(bin, 'bench_live', join(bin, '../share/sonde/thigh.sonde'), `${depth}`)) }])),
   closure: {
     sources: ['src/sonde/interior', 'src/sonde-fit/fit', ...engine, 'data/thigh'],
     measure(bin) {
@@ -402,6 +405,11 @@ const BLOCKS = {
       const cell = key => fixed(e.force_n[key], 3) + (name === 'fine' ? '' : ` (${e.force_n[key] > fine.force_n[key] ? '+' : ''}${fixed(100 * (e.force_n[key] / fine.force_n[key] - 1), 1)} %)`)
       return [contact === 'slip' ? 'sliding, rounded by 3 mm' : 'bonded', name, fixed(e.unknowns, 0), ...['at_2', 'at_6', 'at_10', 'at_14', 'at_20'].map(cell)]
     }))),
+  solid_live: figures => table(['to, mm', 'mm/s', 'way', 'rms, %', 'most, %', 'most, N', 'jump, N', 'at rest, %', 'of one core, %'],
+    [14, 22].flatMap(depth => [10, 20, 40].flatMap(speed => Object.entries({ press: 'pressed', slide_across: 'slid 6 mm across', back_across: 'and back', slide_along: 'slid 6 mm along', back_along: 'and back', withdraw: 'withdrawn to 1 mm' }).map(([key, name]) => {
+      const e = figures[`solid_live_${depth}`][`at_${speed}`][key]
+      return [fixed(depth, 0), fixed(speed, 0), name, fixed(e.rms_percent, 2), fixed(e.most_percent, 1), fixed(e.most_n, 3), fixed(e.jump_n, 3), fixed(e.held_percent, 2), fixed(e.core_percent, 0)]
+    })))),
   ellipsoid: ({ ellipsoid }) => table(['nodes', 'steps/s', 'error', 'nodes awake', 'iterations per step'],
     Object.entries(ellipsoid).map(([name, e]) =>
       [fixed(Number(name.slice(6)), 0), fixed(e.steps_per_s, 0), `${fixed(e.error_percent, 2)} %`, fixed(e.awake, 0), fixed(e.iterations, 1)])),

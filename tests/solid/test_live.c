@@ -3,6 +3,9 @@
 #include "fixture.h"
 #include "solid/live.h"
 
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
 #include <string.h>
 
 typedef struct rig {
@@ -83,18 +86,42 @@ static void a_held_pose_ends_at_the_equilibrium(void **state) {
   tear_down(&r);
 }
 
-// Presses, slides and lets go. The worker works at once, or as late as it may.
-static void run_script(bool late, sonde_vec3 force[400], sonde_solid_live_counts *counts) {
+typedef enum worker { AT_ONCE, AS_LATE_AS_IT_MAY, ON_A_THREAD } worker;
+typedef struct hand {
+  sonde_solid_live *live;
+  atomic_bool over;
+} hand;
+
+static void *work_on(void *user) {
+  hand *h = user;
+  while (!atomic_load(&h->over))
+    if (!sonde_solid_live_work(h->live)) sched_yield();
+  return NULL;
+}
+
+// Presses, slides and lets go.
+static void run_script(worker kind, sonde_vec3 force[400], sonde_solid_live_counts *counts) {
   rig r;
   set_up(&r, 3e-3);
+  hand h = {.live = r.live};
+  pthread_t thread;
+  if (kind == ON_A_THREAD) assert_int_equal(pthread_create(&thread, NULL, work_on, &h), 0);
   for (int t = 0; t < 400; ++t) {
     sonde_solid_contact contact;
     const double depth = 5e-3 * sin(SONDE_PI * t / 400), aside = t > 150 ? 1e-5 * (t - 150) : 0;
+    const int tick = t % (int)r.def.pass_ticks;
+    // A machine that is busy may be late, which is another test.
+    while (kind == ON_A_THREAD && tick == 0 &&
+           atomic_load(&r.live->done) != atomic_load(&r.live->asked))
+      sched_yield();
     sonde_solid_live_tick(r.live, deep(&r, depth, aside), &contact);
-    if (!late || t % (int)r.def.pass_ticks == (int)r.def.pass_ticks - 1)
+    if (kind == AT_ONCE || (kind == AS_LATE_AS_IT_MAY && tick == (int)r.def.pass_ticks - 1))
       (void)sonde_solid_live_work(r.live);
     force[t] = contact.force_n;
   }
+  while (atomic_load(&r.live->done) != atomic_load(&r.live->asked)) sched_yield();
+  atomic_store(&h.over, true);
+  if (kind == ON_A_THREAD) assert_int_equal(pthread_join(thread, NULL), 0);
   *counts = sonde_solid_live_count(r.live);
   tear_down(&r);
 }
@@ -103,10 +130,12 @@ static void forces_follow_from_poses_and_ticks(void **state) {
   (void)state;
   sonde_vec3 one[400], other[400];
   sonde_solid_live_counts counts[2];
-  run_script(false, one, &counts[0]);
-  run_script(true, other, &counts[1]);
-  assert_memory_equal(one, other, sizeof one);
-  assert_memory_equal(&counts[0], &counts[1], sizeof counts[0]);
+  run_script(AT_ONCE, one, &counts[0]);
+  for (worker kind = AS_LATE_AS_IT_MAY; kind <= ON_A_THREAD; ++kind) {
+    run_script(kind, other, &counts[1]);
+    assert_memory_equal(one, other, sizeof one);
+    assert_memory_equal(&counts[0], &counts[1], sizeof counts[0]);
+  }
   assert_int_equal(counts[0].late, 0);
   assert_int_equal(counts[0].passes, 20);
   assert_true(v_norm(one[200]) > 0.3);
