@@ -97,8 +97,9 @@ export class PictureGuide {
     lines.forEach((line, k) => text.append(draw("tspan", { x, y: row.y + k * ROW_PX + 4, class: k < names ? "name" : "why" }, line)));
     return [
       draw("ellipse", { cx, cy, rx, ry, class: kind }),
-      // Beside the ring a line leads to it; a label right below needs none.
-      ...(apart > 2 ? [draw("path", { d: `M${end} ${row.y}L${cx + side * rx} ${cy}`, class: kind })] : []),
+      // Beside the ring, or far below it, a line leads to it; a label right below needs none.
+      ...(apart > 2 ? [draw("path", { d: `M${end} ${row.y}L${cx + side * rx} ${cy}`, class: kind })]
+        : row.y > cy + ry + 2 * ROW_PX ? [draw("path", { d: `M${cx + side * Math.min(rx, Math.abs(end - cx))} ${row.y - 9}L${cx + 0.7 * side * rx} ${cy + 0.7 * ry}`, class: kind })] : []),
       text,
     ];
   }

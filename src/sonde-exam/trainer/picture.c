@@ -102,8 +102,10 @@ void sonde_picture_read(const sonde_judge *judge, const sonde_case_setup *setup,
     else if (v->vessel == 1)
       snprintf(mark->why, sizeof mark->why, "round, thick wall, beats, keeps its shape");
   }
-  // What only looks like a vein, where the plane cuts it; the tissue's motion is left out.
-  for (uint32_t k = 0; k < setup->findings.lesion_count && full && !off; ++k) {
+  // What only looks like a vein, where it lies at rest: under a press the tissue has carried it
+  // away.
+  const bool light = s->force_normal_n < BEGIN_N;
+  for (uint32_t k = 0; k < setup->findings.lesion_count && full && !off && light; ++k) {
     const sonde_lesion *lesion = &setup->findings.lesion[k];
     const sonde_vec3 at = pose_apply_inverse(s->world_from_probe, lesion->centre_m);
     if (fabs(at.y) > lesion->half_m.z || fabs(at.x) > 0.035 || at.z < 0) continue;
