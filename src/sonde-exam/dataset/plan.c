@@ -260,10 +260,7 @@ sonde_status sonde_dataset_plan_load(const char *path, sonde_dataset_plan *plan,
   if (!status) {
     const sonde_place root = sonde_reader_root(reader);
     sonde_read_keys(reader, root, "a plan", keys);
-    const double version = sonde_read_real(reader, root, "sonde_dataset", 0, 1e6, (double)NAN);
-    if (version != SONDE_DATASET_VERSION)
-      sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_dataset"), SONDE_VERSION,
-                        "plan of version %g, expected %d", version, SONDE_DATASET_VERSION);
+    sonde_read_version(reader, root, "sonde_dataset", "plan", SONDE_DATASET_VERSION);
     read_line(reader, root, "title", plan->title, sizeof plan->title);
     read_line(reader, root, "licence", plan->licence, sizeof plan->licence);
     plan->seed = sonde_read_integer(reader, root, "seed", 0, UINT32_MAX, (uint32_t)plan->seed);

@@ -64,10 +64,7 @@ sonde_status sonde_lesson_load(const char *path, sonde_lesson *out, sonde_error 
   }
   sonde_place root = sonde_reader_root(reader);
   sonde_read_keys(reader, root, "a lesson", KEYS);
-  double version = sonde_read_real(reader, root, "sonde_lesson", 0, 1e6, none);
-  if (version != SONDE_LESSON_VERSION)
-    sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_lesson"), SONDE_VERSION,
-                      "lesson of version %g, expected %d", version, SONDE_LESSON_VERSION);
+  sonde_read_version(reader, root, "sonde_lesson", "lesson", SONDE_LESSON_VERSION);
   sonde_exam_protocol *places = &out->protocol;
   sonde_read_member(reader, root, "id", true, id, sizeof id);
   snprintf(places->id, sizeof places->id, "%s%s", PREFIX, id);

@@ -64,10 +64,7 @@ sonde_status sonde_exam_protocol_parse(const char *text, const char *name, sonde
   if (status) return status;
   sonde_place root = sonde_reader_root(reader);
   sonde_read_keys(reader, root, "a protocol", KEYS);
-  double version = sonde_read_real(reader, root, "sonde_protocol", 0, 1e6, (double)NAN);
-  if (version != SONDE_EXAM_PROTOCOL_VERSION)
-    sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_protocol"), SONDE_VERSION,
-                      "protocol of version %g, expected %d", version, SONDE_EXAM_PROTOCOL_VERSION);
+  sonde_read_version(reader, root, "sonde_protocol", "protocol", SONDE_EXAM_PROTOCOL_VERSION);
   sonde_read_member(reader, root, "id", true, out->id, sizeof out->id);
   sonde_read_member(reader, root, "title", true, out->title, sizeof out->title);
   sonde_read_member(reader, root, "text", true, out->text, sizeof out->text);

@@ -40,10 +40,7 @@ sonde_status sonde_scanner_load(const char *path, sonde_scanner *scanner, char *
   if (!status) {
     sonde_place root = sonde_reader_root(reader);
     sonde_read_keys(reader, root, "a scanner", keys);
-    double version = sonde_read_real(reader, root, "sonde_scanner", 0, 1e6, (double)NAN);
-    if (version != SONDE_SCANNER_VERSION)
-      sonde_reader_fail(reader, sonde_read_find(reader, root, "sonde_scanner"), SONDE_VERSION,
-                        "scanner of version %g, expected %d", version, SONDE_SCANNER_VERSION);
+    sonde_read_version(reader, root, "sonde_scanner", "scanner", SONDE_SCANNER_VERSION);
     const char *words = sonde_read_text(reader, root, "title", true);
     if (title && words) snprintf(title, size, "%s", words);
     for (uint32_t k = 0; k < count; ++k) {

@@ -247,6 +247,15 @@ double sonde_read_real(sonde_reader *reader, sonde_place map, const char *key, d
   return isnan(fallback) ? low : fallback;
 }
 
+void sonde_read_version(sonde_reader *reader, sonde_place map, const char *key, const char *what,
+                        int version) {
+  SONDE_ASSERT(key && what);
+  const double found = sonde_read_real(reader, map, key, 0, 1e6, (double)NAN);
+  if (found != version)
+    sonde_reader_fail(reader, sonde_read_find(reader, map, key), SONDE_VERSION,
+                      "%s of version %g, expected %d", what, found, version);
+}
+
 uint32_t sonde_read_integer(sonde_reader *reader, sonde_place map, const char *key, uint32_t low,
                             uint32_t high, uint32_t fallback) {
   double value = sonde_read_real(reader, map, key, low, high, fallback);

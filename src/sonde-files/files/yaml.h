@@ -35,6 +35,9 @@ SONDE_LINK uint32_t sonde_read_count(sonde_reader *reader, sonde_place list);
 SONDE_LINK sonde_place sonde_read_item(const sonde_reader *reader, sonde_place list,
                                        uint32_t index);
 
+// Refuses another version of a format than this one, or none: "`what` of version 2, expected 1".
+SONDE_LINK void sonde_read_version(sonde_reader *reader, sonde_place map, const char *key,
+                                   const char *what, int version);
 // Numbers within [low, high]; a NaN fallback makes the key necessary.
 SONDE_LINK double sonde_read_real(sonde_reader *reader, sonde_place map, const char *key,
                                   double low, double high, double fallback);
