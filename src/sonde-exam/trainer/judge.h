@@ -3,6 +3,7 @@
 #define SONDE_SRC_TRAINER_JUDGE_H
 
 #include "trainer/trainer.h"
+#include "sonde/trainer_worksheet.h"
 
 enum { JUDGE_BINS = 1024, FORCE_BINS = 256 };
 // Stretches of vein are kept in steps of half a millimetre; force against time in steps of 1/4 N.
@@ -120,5 +121,8 @@ bool sonde_press_is_astray(const sonde_judge *judge);
 struct sonde_picture;
 void sonde_guide_way(const sonde_judge *judge, const sonde_plan_point *point, sonde_pose pose,
                      struct sonde_picture *picture);
+
+// Age of a clot by Young's modulus (docs/interior.md).
+sonde_sheet_age sonde_clot_age(double modulus_pa);
 
 #endif

@@ -10,7 +10,6 @@
 static const double ASIDE_M = 0.025;
 static const double OFF_SKIN_M = -0.001;
 static const double EMPTY = 0.6; // of its area: a vein that is pressed shows it by now
-static const double ACUTE_PA = 15e3, CHRONIC_PA = 35e3; // as of docs/worksheet.md
 
 const char *sonde_mark_kind_name(sonde_mark_kind kind) {
   static const char *const NAME[] = {"vein", "artery", "lesion"};
@@ -34,10 +33,10 @@ static void say_why(const sonde_judge *judge, const sonde_case_setup *setup,
       !(v->rest_z_m >= clot->thrombus_from_m && v->rest_z_m <= clot->thrombus_to_m))
     clot = NULL;
   if (clot && !(clot->thrombus_fraction > 0)) clot = NULL;
-  const double modulus_pa = clot ? clot->thrombus_modulus_pa : 0;
-  const char *age = modulus_pa < ACUTE_PA     ? "a fresh clot, dark as blood"
-                    : modulus_pa > CHRONIC_PA ? "an old clot, firm and bright"
-                                              : "a clot, firmer and brighter than blood";
+  const sonde_sheet_age of_age = sonde_clot_age(clot ? clot->thrombus_modulus_pa : 0);
+  const char *age = of_age == SONDE_SHEET_ACUTE     ? "a fresh clot, dark as blood"
+                    : of_age == SONDE_SHEET_CHRONIC ? "an old clot, firm and bright"
+                                                    : "a clot, firmer and brighter than blood";
   if (mark->area_ratio <= judge->plan.criteria.closed_ratio)
     snprintf(mark->why, sizeof mark->why, "closed: the walls touch, there is no clot here");
   else if (force_n >= target->firm_n && mark->area_ratio >= judge->plan.criteria.open_ratio)

@@ -11,8 +11,6 @@
 static const double ASIDE_M = 0.025, DEEP_M = 0.12;
 // Less of the lumen filled than this is a clot in a part of it.
 static const double OCCLUSIVE = 0.9;
-// Solids softer than the first are acute, stiffer than the second chronic (docs/interior.md).
-static const double ACUTE_PA = 15e3, CHRONIC_PA = 35e3;
 // A picture without compression shows at least this much of the vein's area at rest.
 static const double OPEN_RATIO = 0.5;
 static const double LEVEL_M = 0.001; // places nearer than this along the leg are one station
@@ -26,6 +24,13 @@ const char *sonde_sheet_outcome_name(sonde_sheet_outcome outcome) {
 }
 
 // ---- the truth of a place
+
+sonde_sheet_age sonde_clot_age(double modulus_pa) {
+  const double acute_pa = 15e3, chronic_pa = 35e3; // docs/interior.md
+  return modulus_pa < acute_pa     ? SONDE_SHEET_ACUTE
+         : modulus_pa > chronic_pa ? SONDE_SHEET_CHRONIC
+                                   : SONDE_SHEET_INDETERMINATE;
+}
 
 // What the plane of a place shows of one vein, given by its points from proximal to distal: each
 // crossing in the picture that lies in the clot, or within reach of its end.
@@ -55,10 +60,7 @@ static void look_at_vein(const sonde_plan_point *place, double reach_m, const so
     const bool whole = clot->thrombus_fraction >= OCCLUSIVE;
     v->truth = whole ? SONDE_SHEET_NOT_COMPRESSIBLE : SONDE_SHEET_PARTLY;
     v->truth_kind = whole ? SONDE_SHEET_OCCLUSIVE : SONDE_SHEET_PART_OF_LUMEN;
-    const double modulus_pa = clot->thrombus_modulus_pa;
-    v->truth_age = modulus_pa < ACUTE_PA     ? SONDE_SHEET_ACUTE
-                   : modulus_pa > CHRONIC_PA ? SONDE_SHEET_CHRONIC
-                                             : SONDE_SHEET_INDETERMINATE;
+    v->truth_age = sonde_clot_age(clot->thrombus_modulus_pa);
   }
 }
 
