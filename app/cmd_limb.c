@@ -404,13 +404,7 @@ static int run(void *given) {
   if (!status && a->skin)
     status = pose ? sonde_limb_pose_skin(pose, 0.004, &skin, &error)
                   : sonde_limb_skin(limb, 0.004, &skin, &error);
-  // The limb's frame is left-handed (medial, front, up); a file has the patient's left, back and
-  // head.
-  for (uint32_t i = 0; i < skin.vertex_count; ++i) skin.vertices[i].y = -skin.vertices[i].y;
-  for (uint32_t i = 0; i < skin.face_count; ++i) {
-    const uint32_t second = skin.faces[i][1];
-    skin.faces[i][1] = skin.faces[i][2], skin.faces[i][2] = second;
-  }
+  if (!status && a->skin) sonde_limb_to_patient(&skin);
   if (!status && a->skin) status = sonde_mesh_save(a->skin, 1e-3, &skin, &error);
   app_progress_end();
   if (!status) (a->json ? print_json : print_text)(a, limb, pose, &from);

@@ -175,6 +175,9 @@ SONDE_API void sonde_limb_polar(const sonde_limb *limb, sonde_vec3 point, double
  */
 SONDE_API sonde_status sonde_limb_skin(const sonde_limb *limb, double edge_m, sonde_mesh *mesh,
                                        sonde_error *error);
+/** Turns a surface from the limb's frame, which is left-handed (x to the patient's left, y to the
+ * front, z up), to the patient's left, back and head (LPS), as files have it. @thread owner */
+SONDE_API void sonde_limb_to_patient(sonde_mesh *mesh);
 /** Closed surface of one bone, genus 0; as sonde_limb_skin(). @thread owner */
 SONDE_API sonde_status sonde_limb_bone_mesh(const sonde_limb *limb, sonde_limb_bone bone,
                                             double edge_m, sonde_mesh *mesh, sonde_error *error);

@@ -13,18 +13,12 @@ typedef struct scanned {
   sonde_leg_scan scan;
 } scanned;
 
-// From the limb's frame (medial, front, up) to a patient who lies a little turned: left, back,
-// head.
+// To a patient who lies a little turned.
 static void lay(sonde_mesh *mesh) {
   const sonde_quat turned = q_unit((sonde_quat){1, 0.03, 0.04, 0.05});
-  for (uint32_t i = 0; i < mesh->vertex_count; ++i) {
-    const sonde_vec3 p = mesh->vertices[i];
-    mesh->vertices[i] = v_add(q_rotate(turned, vec3(p.x, -p.y, p.z)), vec3(0.1, 0.05, 0.9));
-  }
-  for (uint32_t i = 0; i < mesh->face_count; ++i) {
-    const uint32_t second = mesh->faces[i][1];
-    mesh->faces[i][1] = mesh->faces[i][2], mesh->faces[i][2] = second;
-  }
+  sonde_limb_to_patient(mesh);
+  for (uint32_t i = 0; i < mesh->vertex_count; ++i)
+    mesh->vertices[i] = v_add(q_rotate(turned, mesh->vertices[i]), vec3(0.1, 0.05, 0.9));
 }
 
 // The deep fascia as an open tube.

@@ -15,8 +15,6 @@ static const double LEAST_SKIN_M = 0.2, MOST_SKIN_M = 1.3, WHOLE_LEG_M = 0.6, TH
 static const double UPPER_END_M = 0.005, WIDEST_LEG_M = 0.12;
 static const double REACH_M = 0.25, BONE_REACH_M = 0.07, WIDEST_BONE = 1.6; // of the shaft
 
-static sonde_vec3 across(sonde_vec3 d, sonde_vec3 axis) { return v_madd(d, -v_dot(d, axis), axis); }
-
 // Largest principal direction of the vertices within [low, high] along the axis, by power
 // iteration.
 static sonde_vec3 wide_direction(const sonde_mesh *mesh, const scan_frame *f, double low,
@@ -29,7 +27,7 @@ static sonde_vec3 wide_direction(const sonde_mesh *mesh, const scan_frame *f, do
       sonde_vec3 d = v_sub(mesh->vertices[i], f->origin);
       double s = v_dot(d, f->z);
       if (s < low || s > high) continue;
-      if (only_across) d = across(d, f->z);
+      if (only_across) d = scan_across(d, f->z);
       if (pass == 0)
         mean = v_add(mean, d), ++count;
       else
@@ -75,7 +73,7 @@ static sonde_vec3 end_offset(const sonde_mesh *femur, const scan_frame *f, bool 
   sonde_vec3 centre;
   double low = far ? f->high - HEAD * length : f->low, high = low + HEAD * length;
   if (!scan_slab_centre(femur, f, low, high, &centre)) return vec3(0, 0, 0);
-  return across(v_sub(centre, f->origin), f->z);
+  return scan_across(v_sub(centre, f->origin), f->z);
 }
 
 // What to say about a length that lies in the range when it is taken in another unit.
@@ -132,7 +130,7 @@ sonde_status scan_femur_frame(const sonde_leg_scan *scan, scan_frame *f, sonde_e
                       length * 1e3, v_norm(head) * 1e3,
                       unit_hint(length, LEAST_FEMUR_M, MOST_FEMUR_M));
   sonde_vec3 wide = wide_direction(scan->femur, f, f->high - CONDYLES * length, f->high, true);
-  wide = v_unit(across(wide, f->z), head);
+  wide = v_unit(scan_across(wide, f->z), head);
   f->x = v_dot(wide, head) < 0 ? v_neg(wide) : wide;
   f->y = v_cross(f->z, f->x);
   if (scan->left) f->y = v_neg(f->y);
@@ -236,7 +234,7 @@ static void centre_line(const sonde_surface_index *skin, const scan_frame *f, so
 // Turns the frame until z runs along a direction of the frame, and moves its origin.
 static void turn(scan_frame *f, sonde_vec3 along, sonde_vec3 origin) {
   sonde_vec3 z = v_unit(along, vec3(0, 0, 1));
-  sonde_vec3 x = v_unit(across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
+  sonde_vec3 x = v_unit(scan_across(vec3(1, 0, 0), z), vec3(1, 0, 0)), y = v_cross(z, x);
   scan_frame old = *f;
   f->origin = scan_point(&old, origin);
   f->x = v_sub(scan_point(&old, x), old.origin);
@@ -275,7 +273,7 @@ static sonde_status skin_frame(const sonde_leg_scan *scan, const sonde_surface_i
     sum = v_add(sum, d), ++count;
   }
   const sonde_vec3 upright = f->z;
-  sonde_vec3 middle = across(v_scale(sum, 1.0 / (count > 0 ? count : 1)), upright);
+  sonde_vec3 middle = scan_across(v_scale(sum, 1.0 / (count > 0 ? count : 1)), upright);
   f->origin = v_madd(v_add(f->origin, middle), f->low + UPPER_END_M, upright);
   for (int pass = 0; pass < 3; ++pass) {
     // z runs beside the middles of the sections by the slope that the femur has against them.
@@ -289,7 +287,7 @@ static sonde_status skin_frame(const sonde_leg_scan *scan, const sonde_surface_i
     // The upper end of a leg that leans slants: it begins as far above the end of the axis on one
     // side as it ends below it on the other. An open end is taken to lie across the patient.
     scan_extent(scan->skin, f);
-    double slant = v_norm(across(upright, f->z)) * WIDEST_LEG_M;
+    double slant = v_norm(scan_across(upright, f->z)) * WIDEST_LEG_M;
     double up = scan_cast(index, f, vec3(0, 0, 0.5 * length), vec3(0, 0, -1), high);
     if (isfinite(up)) slant = fmin(slant, 0.5 * length - up - f->low);
     double start = f->low + 2 * fmax(slant, 0) + UPPER_END_M;

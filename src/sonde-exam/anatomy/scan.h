@@ -21,6 +21,11 @@ static inline sonde_vec3 scan_local(const scan_frame *f, sonde_vec3 p) {
   return vec3(v_dot(d, f->x), v_dot(d, f->y), v_dot(d, f->z));
 }
 
+// The part of a direction that is perpendicular to a unit axis.
+static inline sonde_vec3 scan_across(sonde_vec3 direction, sonde_vec3 axis) {
+  return v_madd(direction, -v_dot(direction, axis), axis);
+}
+
 // Finds the extent of a mesh along z.
 void scan_extent(const sonde_mesh *mesh, scan_frame *f);
 // Finds the mean of a surface between two heights, by area, in the scan; false: there is none.

@@ -28,7 +28,7 @@ typedef struct leg {
 
 static void turn_z(scan_frame *f, sonde_vec3 down, bool left) {
   f->z = v_unit(down, f->z);
-  f->x = v_unit(v_madd(f->x, -v_dot(f->x, f->z), f->z), f->x);
+  f->x = v_unit(scan_across(f->x, f->z), f->x);
   f->y = v_cross(f->z, f->x);
   if (left) f->y = v_neg(f->y);
 }

@@ -5,13 +5,20 @@
 
 #include "geometry/isosurface.h"
 
-// Mirrors a mesh in x and turns its faces, so that they stay counter-clockwise from outside.
-static void mirror(sonde_mesh *mesh) {
-  for (uint32_t i = 0; i < mesh->vertex_count; ++i) mesh->vertices[i].x = -mesh->vertices[i].x;
+// Mirrors a mesh by the signs of x and y and turns its faces, so that they stay counter-clockwise
+// from outside.
+static void mirror(sonde_mesh *mesh, double x, double y) {
+  for (uint32_t i = 0; i < mesh->vertex_count; ++i)
+    mesh->vertices[i].x *= x, mesh->vertices[i].y *= y;
   for (uint32_t i = 0; i < mesh->face_count; ++i) {
     uint32_t keep = mesh->faces[i][1];
     mesh->faces[i][1] = mesh->faces[i][2], mesh->faces[i][2] = keep;
   }
+}
+
+void sonde_limb_to_patient(sonde_mesh *mesh) {
+  SONDE_ASSERT(mesh);
+  mirror(mesh, 1, -1);
 }
 
 sonde_status sonde_limb_skin(const sonde_limb *limb, double edge_m, sonde_mesh *mesh,
@@ -57,7 +64,7 @@ sonde_status sonde_limb_skin(const sonde_limb *limb, double edge_m, sonde_mesh *
     }
   }
   SONDE_ASSERT(face == mesh->face_count);
-  if (limb->body.side == SONDE_LIMB_LEFT) mirror(mesh);
+  if (limb->body.side == SONDE_LIMB_LEFT) mirror(mesh, -1, 1);
   return SONDE_OK;
 }
 
@@ -90,6 +97,6 @@ sonde_status sonde_limb_bone_mesh(const sonde_limb *limb, sonde_limb_bone bone, 
   if (status) return status;
   for (uint32_t k = 0; k < mesh->vertex_count; ++k)
     mesh->vertices[k] = v_madd(low, edge_m, mesh->vertices[k]);
-  if (limb->body.side == SONDE_LIMB_LEFT) mirror(mesh);
+  if (limb->body.side == SONDE_LIMB_LEFT) mirror(mesh, -1, 1);
   return SONDE_OK;
 }
