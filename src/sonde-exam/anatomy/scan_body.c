@@ -3,13 +3,16 @@
 
 #include "anatomy/scan.h"
 
-static const double STEP_M = 0.005, LEAST_LEG_M = 0.6, MOST_LEG_M = 1.3, USUAL_SKIN_M = 0.0018;
-static const double UPPER_END_M = 0.005;                       // a scan is cut unevenly
-static const double LEAST_GIRTH_M = 0.28, MOST_GIRTH_M = 0.95; // of a thigh
-// Levels of a limb with the largest girth of the calf and the least above the ankle, and of the
-// groin crease, where a skin without a femur begins.
+static const double STEP_M = 0.005; // between sections
+static const double LEAST_LEG_M = 0.6, MOST_LEG_M = 1.3, LEAST_GIRTH_M = 0.28, MOST_GIRTH_M = 0.95;
+static const double USUAL_SKIN_M = 0.0018;
+static const double UPPER_END_M = 0.005; // the upper end of a scan is cut unevenly
+// A limb has the largest girth of its calf at level CALF, the least above its ankle at ANKLE, and
+// its girths of thigh and knee are measured at THIGH and KNEE; a skin without a femur begins at the
+// groin crease.
 static const double CALF = 1.28, ANKLE = 1.866, CREASE = 0.05, THIGH = 0.12, KNEE = 0.88;
-static const double HEAD = 0.05, CONDYLES_M = 0.035; // share of the femur, from its lower end
+static const double HEAD_SHARE = 0.05;  // of the femur's length: its head lies there
+static const double CONDYLES_M = 0.035; // above the femur's lower end: its condyles lie there
 
 typedef struct section {
   double z_m, girth_m; // below the frame's origin
@@ -21,11 +24,13 @@ typedef struct leg {
   scan_frame f; // z from the hip to the knee, or along the skin's middles from its upper end
   sonde_surface_index *skin, *muscle;
   section row[SONDE_LEG_GIRTHS];
-  uint32_t count, calf, ankle; // rows: of all, of the largest girth below the knee, of the least
+  uint32_t count;
+  uint32_t calf, ankle; // rows of the largest girth below the knee and of the least
   bool calf_shown;
   double hip_m, thigh_m, calf_m;
 } leg;
 
+// Turns the frame until z points down and x lies across it; of a left leg the frame is left-handed.
 static void turn_z(scan_frame *f, sonde_vec3 down, bool left) {
   f->z = v_unit(down, f->z);
   f->x = v_unit(scan_across(f->x, f->z), f->x);
@@ -33,7 +38,8 @@ static void turn_z(scan_frame *f, sonde_vec3 down, bool left) {
   if (left) f->y = v_neg(f->y);
 }
 
-// The frame from the hip through the middle of the condyles; the thigh ends where they do.
+// Lays the frame from the hip's centre through the middle of the condyles; the thigh ends where the
+// condyles end.
 static sonde_status begin_at_hip(leg *l, double *head_m, sonde_error *error) {
   const sonde_mesh *femur = l->scan->femur;
   scan_frame *f = &l->f;
@@ -42,7 +48,7 @@ static sonde_status begin_at_hip(leg *l, double *head_m, sonde_error *error) {
   scan_extent(femur, f);
   double radius_m = 0;
   sonde_vec3 hip, knee;
-  if (!scan_slab_centre(femur, f, f->low, f->low + HEAD * (f->high - f->low), &hip) ||
+  if (!scan_slab_centre(femur, f, f->low, f->low + HEAD_SHARE * (f->high - f->low), &hip) ||
       !scan_slab_centre(femur, f, f->high - CONDYLES_M, f->high, &knee))
     return sonde_fail(error, SONDE_MESH, "the femur has no surface at its ends");
   // A sphere through the half of the head that looks away from the neck.
@@ -82,8 +88,8 @@ static sonde_status begin_at_hip(leg *l, double *head_m, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Girths from the upper end of the skin downwards, as long as sections are closed.
-static void walk(leg *l) {
+// Measures girths from the upper end of the skin downwards, until a section is not closed.
+static void measure_girths(leg *l) {
   const sonde_mesh *skin = l->scan->skin;
   l->count = 0;
   scan_extent(skin, &l->f);
@@ -107,7 +113,7 @@ static void walk(leg *l) {
   }
 }
 
-// The frame along the skin's middles from its upper end, sides by the axes.
+// Lays the frame along the middles of the skin's sections; the scan's axes say which side is where.
 static sonde_status begin_at_skin(leg *l, sonde_error *error) {
   const sonde_leg_scan *scan = l->scan;
   scan_frame *f = &l->f;
@@ -124,7 +130,7 @@ static sonde_status begin_at_skin(leg *l, sonde_error *error) {
                       "the ankle, or a femur",
                       length_m * 1e3, LEAST_LEG_M * 1e3, MOST_LEG_M * 1e3);
   for (int pass = 0; pass < 3; ++pass) {
-    walk(l);
+    measure_girths(l);
     if (l->count < 80) break;
     const sonde_vec3 from = l->row[l->count / 10].middle, to = l->row[8 * l->count / 10].middle;
     const sonde_vec3 down = v_sub(scan_point(f, to), scan_point(f, from));
@@ -134,7 +140,7 @@ static sonde_status begin_at_skin(leg *l, sonde_error *error) {
   return SONDE_OK;
 }
 
-// Mean height of the sections around `row` whose girth differs from its by 2 % at most.
+// Finds the middle of the sections around `row` whose girths differ from that row's by 2 % at most.
 static double middle_of(const leg *l, uint32_t row) {
   const double girth_m = l->row[row].girth_m;
   uint32_t low = row, high = row;
@@ -143,7 +149,7 @@ static double middle_of(const leg *l, uint32_t row) {
   return 0.5 * (l->row[low].z_m + l->row[high].z_m);
 }
 
-// Girth at a distance below the hip; NaN: not shown.
+// Interpolates the skin's girth at a distance below the hip; NaN where no section shows it.
 static double girth_at(const leg *l, double below_m) {
   const double z_m = l->hip_m + below_m;
   for (uint32_t k = 0; k + 1 < l->count; ++k) {
@@ -159,8 +165,8 @@ static double below_hip(const leg *l, double level) {
   return level <= 1 ? level * l->thigh_m : l->thigh_m + (level - 1) * l->calf_m;
 }
 
-// Thickness between skin and muscle along rays to the middle: the median of nine around a place;
-// NaN: fewer than five meet both.
+// Measures the fat between skin and muscle along rays to the section's middle: the median of nine
+// rays around a place, NaN where fewer than five meet both surfaces.
 static double fat_at(const leg *l, double level, double angle_rad, double skin_m) {
   enum { ASIDE = 1 };
   const double aside_rad = 0.14, along_m = 0.008, most_m = 0.12, far_m = 0.25;
@@ -186,7 +192,7 @@ static double fat_at(const leg *l, double level, double angle_rad, double skin_m
   return found[count / 2];
 }
 
-// Sets a member that is not known, where the scan shows it within the parameter's range.
+// Sets a member that is not known to a measured value that lies in the parameter's range.
 static void set(sonde_limb_body *body, double *member, double value) {
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
@@ -196,7 +202,8 @@ static void set(sonde_limb_body *body, double *member, double value) {
       *member = whole_nm(value);
 }
 
-// Sets a member that is not known to where the rules draw the measured one from it, for this seed.
+// Finds the value of a member that is not known from which the rules, for this seed, draw the
+// measured member as it was measured.
 static void infer(sonde_limb_body *body, uint64_t seed, double *member, double low, double high,
                   double *measured) {
   const double wanted = *measured;
@@ -214,7 +221,8 @@ static void infer(sonde_limb_body *body, uint64_t seed, double *member, double l
   if (status) *member = NAN;
 }
 
-static void measure(const leg *l, double head_m, sonde_limb_body *body, sonde_leg_girths *girths) {
+static void fill_body(const leg *l, double head_m, sonde_limb_body *body,
+                      sonde_leg_girths *girths) {
   set(body, &body->thigh_length_m, l->thigh_m);
   set(body, &body->girth_thigh_m, girth_at(l, below_hip(l, THIGH)));
   set(body, &body->girth_knee_m, girth_at(l, below_hip(l, KNEE)));
@@ -233,7 +241,7 @@ static void measure(const leg *l, double head_m, sonde_limb_body *body, sonde_le
   for (size_t k = 0; l->muscle && k < SONDE_COUNT_OF(FAT); ++k)
     if (FAT[k].level <= 1 || l->calf_shown)
       set(body, FAT[k].member, fat_at(l, FAT[k].level, FAT[k].turn * 2 * SONDE_PI, skin_m));
-  // The femur's shaft half-way down and, of its lower end, the width and the depth.
+  // The shaft is measured half-way down, the condyles by the extent of the lower end.
   const sonde_mesh *femur = l->scan->femur;
   double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY}, radius_m = 0;
   uint32_t near = 0;
@@ -279,7 +287,7 @@ sonde_status sonde_leg_scan_body(const sonde_leg_scan *scan, uint64_t seed, sond
   if (!status && scan->muscle) status = sonde_surface_index_create(scan->muscle, &l->muscle, error);
   if (!status) status = scan->femur ? begin_at_hip(l, &head_m, error) : begin_at_skin(l, error);
   if (!status) {
-    walk(l);
+    measure_girths(l);
     uint32_t first = 0;
     while (scan->femur && first < l->count && l->row[first].z_m < l->thigh_m + 6 * STEP_M) ++first;
     // The ankle has the least girth, the heel below it is wider; going up, the girth rises to the
@@ -321,7 +329,7 @@ sonde_status sonde_leg_scan_body(const sonde_leg_scan *scan, uint64_t seed, sond
                         "section of %.0f to %.0f around the femur",
                         half_m * 1e3, LEAST_GIRTH_M * 1e3, MOST_GIRTH_M * 1e3);
   if (!status) {
-    measure(l, head_m, body, girths);
+    fill_body(l, head_m, body, girths);
     infer(body, seed, &body->stature_m, 1.4, 2.1, &body->thigh_length_m);
     infer(body, seed, &body->bmi, 15, 45, &body->girth_thigh_m);
   }
