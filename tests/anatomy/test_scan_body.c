@@ -4,7 +4,16 @@
 #include "anatomy_test.h"
 #include "sonde/anatomy_limb.h"
 
-enum { FEMALE_RIGHT, MALE_LEFT, KINDS };
+// The last one has no less girth below the knee than at the calf.
+static const struct {
+  const char *name;
+  uint64_t seed;
+  sonde_sex sex;
+  sonde_limb_side side;
+  double bmi;
+} KINDS[] = {{"right, lean", 5, SONDE_SEX_FEMALE, SONDE_LIMB_RIGHT, 21},
+             {"left, heavy", 6, SONDE_SEX_MALE, SONDE_LIMB_LEFT, 31},
+             {"right, wide knee", 23, SONDE_SEX_FEMALE, SONDE_LIMB_RIGHT, 27}};
 
 typedef struct scanned {
   sonde_limb_body body;
@@ -44,10 +53,8 @@ static scanned make(int kind) {
   scanned s = {0};
   sonde_limb_body known = sonde_limb_unknown();
   sonde_error error = {0};
-  known.sex = kind == MALE_LEFT ? SONDE_SEX_MALE : SONDE_SEX_FEMALE;
-  known.side = kind == MALE_LEFT ? SONDE_LIMB_LEFT : SONDE_LIMB_RIGHT;
-  known.bmi = kind == MALE_LEFT ? 31 : 21;
-  if (sonde_limb_draw(&known, 5 + (uint64_t)kind, &s.body, &error) ||
+  known.sex = KINDS[kind].sex, known.side = KINDS[kind].side, known.bmi = KINDS[kind].bmi;
+  if (sonde_limb_draw(&known, KINDS[kind].seed, &s.body, &error) ||
       sonde_limb_create(&s.body, &s.limb, &error) ||
       sonde_limb_skin(s.limb, 0.005, &s.skin, &error) ||
       sonde_limb_bone_mesh(s.limb, SONDE_LIMB_FEMUR, 0.004, &s.femur, &error))
@@ -56,7 +63,7 @@ static scanned make(int kind) {
   lay(&s.skin);
   lay(&s.femur);
   lay(&s.fascia);
-  s.scan = (sonde_leg_scan){.left = kind == MALE_LEFT, .axes = SONDE_AXES_LPS};
+  s.scan = (sonde_leg_scan){.left = known.side == SONDE_LIMB_LEFT, .axes = SONDE_AXES_LPS};
   return s;
 }
 
@@ -105,10 +112,10 @@ static sonde_limb_body measured(scanned *s, const char *what, double most_length
 
 static void a_body_comes_back(void **state) {
   (void)state;
-  for (int kind = 0; kind < ROUNDS(KINDS, 1); ++kind) {
+  for (int kind = 0; kind < ROUNDS((int)SONDE_COUNT_OF(KINDS), 1); ++kind) {
     scanned s = make(kind);
     s.scan.skin = &s.skin, s.scan.femur = &s.femur, s.scan.muscle = &s.fascia;
-    sonde_limb_body got = measured(&s, kind ? "left, heavy" : "right, lean", 0.015, 0.015);
+    sonde_limb_body got = measured(&s, KINDS[kind].name, 0.015, 0.015);
     assert_false(isnan(got.thigh_length_m) || isnan(got.calf_length_m) ||
                  isnan(got.girth_ankle_m) || isnan(got.fat_front_m) || isnan(got.fat_groin_m) ||
                  isnan(got.head_m));
@@ -135,7 +142,7 @@ static void a_body_comes_back(void **state) {
 
 static void skin_alone_gives_lengths_and_girths(void **state) {
   (void)state;
-  scanned s = make(FEMALE_RIGHT);
+  scanned s = make(0);
   s.scan.skin = &s.skin;
   // The skin begins at the groin crease: faces above it are not there.
   double top = -INFINITY;

@@ -25,8 +25,8 @@ typedef struct leg {
   sonde_surface_index *skin, *muscle;
   section row[SONDE_LEG_GIRTHS];
   uint32_t count;
-  uint32_t calf, ankle; // rows of the largest girth below the knee and of the least
-  bool calf_shown;
+  uint32_t calf, ankle;   // rows of the largest girth below the knee and of the least
+  bool calf_shown, falls; // above the calf the girth falls towards the knee
   double hip_m, thigh_m, calf_m;
 } leg;
 
@@ -228,7 +228,9 @@ static void fill_body(const leg *l, double head_m, sonde_limb_body *body,
   set(body, &body->girth_knee_m, girth_at(l, below_hip(l, KNEE)));
   if (l->calf_shown) {
     set(body, &body->calf_length_m, l->calf_m);
-    set(body, &body->girth_calf_m, l->row[l->calf].girth_m);
+    // A leg whose girth goes on rising to the knee has that of its calf at the calf's level.
+    set(body, &body->girth_calf_m,
+        l->falls ? l->row[l->calf].girth_m : girth_at(l, below_hip(l, CALF)));
     set(body, &body->girth_ankle_m, l->row[l->ankle].girth_m);
   }
   const struct {
@@ -303,7 +305,7 @@ sonde_status sonde_leg_scan_body(const sonde_leg_scan *scan, uint64_t seed, sond
       if (l->row[k].girth_m > l->row[calf].girth_m) calf = k;
     const bool falls = widens && l->row[k].girth_m <= 0.995 * l->row[calf].girth_m;
     const bool shown = widens && calf < ankle && (falls || (first > 0 && calf > first));
-    l->calf = calf, l->ankle = ankle, l->calf_shown = shown;
+    l->calf = calf, l->ankle = ankle, l->calf_shown = shown, l->falls = falls;
     const double ankle_m = shown ? middle_of(l, l->ankle) : NAN;
     if (shown && scan->femur) l->calf_m = (ankle_m - l->thigh_m) / (ANKLE - 1);
     if (shown && !scan->femur) {
