@@ -55,6 +55,7 @@ test_packages() {
   has chromium || has google-chrome || missing+=(chromium)
   need_command mandoc mandoc
   need_command teem-unu teem-apps
+  need_command ccx calculix-ccx # a separate finite-element program that solves the same press
   installed python3-numpy || missing+=(python3-numpy)
   installed python3-setuptools || missing+=(python3-setuptools)
   installed python3-wheel || missing+=(python3-wheel)

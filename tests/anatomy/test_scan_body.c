@@ -140,38 +140,44 @@ static void a_body_comes_back(void **state) {
   }
 }
 
+// Takes away the skin above the groin crease.
+static double cut_at_crease(scanned *s) {
+  double top = -INFINITY;
+  for (uint32_t i = 0; i < s->skin.vertex_count; ++i) top = fmax(top, s->skin.vertices[i].z);
+  const double crease = top - 0.25 * s->body.thigh_length_m;
+  uint32_t kept = 0;
+  for (uint32_t f = 0; f < s->skin.face_count; ++f)
+    if (s->skin.vertices[s->skin.faces[f][0]].z < crease)
+      memcpy(s->skin.faces[kept++], s->skin.faces[f], sizeof s->skin.faces[f]);
+  s->skin.face_count = kept;
+  for (uint32_t i = 0; i < s->skin.vertex_count; ++i)
+    s->skin.vertices[i].z = fmin(s->skin.vertices[i].z, crease);
+  return crease;
+}
+
 static void skin_alone_gives_lengths_and_girths(void **state) {
   (void)state;
-  scanned s = make(0);
-  s.scan.skin = &s.skin;
-  // The skin begins at the groin crease: faces above it are not there.
-  double top = -INFINITY;
-  for (uint32_t i = 0; i < s.skin.vertex_count; ++i) top = fmax(top, s.skin.vertices[i].z);
-  const double crease = top - 0.25 * s.body.thigh_length_m,
-               knee = top - 1.25 * s.body.thigh_length_m;
-  uint32_t kept = 0;
-  for (uint32_t f = 0; f < s.skin.face_count; ++f)
-    if (s.skin.vertices[s.skin.faces[f][0]].z < crease)
-      memcpy(s.skin.faces[kept++], s.skin.faces[f], sizeof s.skin.faces[f]);
-  s.skin.face_count = kept;
-  for (uint32_t i = 0; i < s.skin.vertex_count; ++i)
-    s.skin.vertices[i].z = fmin(s.skin.vertices[i].z, crease);
-  sonde_limb_body got = measured(&s, "skin alone", 0.08, 0.03);
-  assert_true(isnan(got.head_m) && isnan(got.fat_front_m));
+  for (int kind = 0; kind < ROUNDS((int)SONDE_COUNT_OF(KINDS), 1); ++kind) {
+    scanned s = make(kind);
+    s.scan.skin = &s.skin;
+    const double knee = cut_at_crease(&s) - s.body.thigh_length_m;
+    sonde_limb_body got = measured(&s, KINDS[kind].name, 0.045, 0.02);
+    assert_true(isnan(got.head_m) && isnan(got.fat_front_m));
 
-  sonde_leg_girths girths;
-  sonde_error error = {0};
-  s.scan.axes = SONDE_AXES_ANY;
-  assert_int_equal(sonde_leg_scan_body(&s.scan, 1, &got, &girths, &error), SONDE_ARGUMENT);
-  assert_non_null(strstr(error.message, "expected RAS or LPS"));
-  // A thigh alone shows no calf.
-  s.scan.axes = SONDE_AXES_LPS;
-  for (uint32_t i = 0; i < s.skin.vertex_count; ++i)
-    s.skin.vertices[i].z = fmax(s.skin.vertices[i].z, knee) * 1.6;
-  assert_int_equal(sonde_leg_scan_body(&s.scan, 1, &got, &girths, &error), SONDE_MESH);
-  print_message("%s\n", error.message);
-  assert_non_null(strstr(error.message, "expected a leg from the groin to below the ankle"));
-  clear(&s);
+    sonde_leg_girths girths;
+    sonde_error error = {0};
+    s.scan.axes = SONDE_AXES_ANY;
+    assert_int_equal(sonde_leg_scan_body(&s.scan, 1, &got, &girths, &error), SONDE_ARGUMENT);
+    assert_non_null(strstr(error.message, "expected RAS or LPS"));
+    // A thigh alone shows no calf.
+    s.scan.axes = SONDE_AXES_LPS;
+    for (uint32_t i = 0; i < s.skin.vertex_count; ++i)
+      s.skin.vertices[i].z = fmax(s.skin.vertices[i].z, knee) * 1.6;
+    assert_int_equal(sonde_leg_scan_body(&s.scan, 1, &got, &girths, &error), SONDE_MESH);
+    print_message("%s\n", error.message);
+    assert_non_null(strstr(error.message, "expected a leg from the groin to below the ankle"));
+    clear(&s);
+  }
 }
 
 int main(void) {

@@ -6,13 +6,17 @@
 static const double STEP_M = 0.005; // between sections
 static const double LEAST_LEG_M = 0.6, MOST_LEG_M = 1.3, LEAST_GIRTH_M = 0.28, MOST_GIRTH_M = 0.95;
 static const double USUAL_SKIN_M = 0.0018;
-static const double UPPER_END_M = 0.005; // the upper end of a scan is cut unevenly
-// A limb has the largest girth of its calf at level CALF, the least above its ankle at ANKLE, and
-// its girths of thigh and knee are measured at THIGH and KNEE; a skin without a femur begins at the
-// groin crease.
-static const double CALF = 1.28, ANKLE = 1.866, CREASE = 0.05, THIGH = 0.12, KNEE = 0.88;
-static const double HEAD_SHARE = 0.05;  // of the femur's length: its head lies there
-static const double CONDYLES_M = 0.035; // above the femur's lower end: its condyles lie there
+// The ends of a scan are cut unevenly and aslant.
+static const double UPPER_END_M = 0.005, LOWER_END_M = 0.01;
+// A limb has the girth of its calf at level CALF, the least above its ankle at ANKLE and the mean
+// of both at HALF_CALF (40 drawn limbs, standard deviation 0.004); its girths of thigh and knee are
+// measured at THIGH and KNEE; a skin without a femur begins at the groin crease.
+static const double CALF = 1.28, HALF_CALF = 1.594, ANKLE = 1.866, CREASE = 0.05, THIGH = 0.12,
+                    KNEE = 0.88;
+static const double HIGHEST_CALF_M = 0.24; // above the ankle
+static const double LEAST_CALF = 1.2;      // girths of the calf over the ankle's
+static const double HEAD_SHARE = 0.05;     // of the femur's length: its head lies there
+static const double CONDYLES_M = 0.035;    // above the femur's lower end: its condyles lie there
 
 typedef struct section {
   double z_m, girth_m; // below the frame's origin
@@ -95,7 +99,7 @@ static void measure_girths(leg *l) {
   scan_extent(skin, &l->f);
   bool inside = false;
   sonde_vec3 middle = vec3(0, 0, 0);
-  for (double z_m = l->f.low + UPPER_END_M; z_m < l->f.high; z_m += STEP_M) {
+  for (double z_m = l->f.low + UPPER_END_M; z_m < l->f.high - LOWER_END_M; z_m += STEP_M) {
     sonde_vec3 sum = vec3(0, 0, 0);
     uint32_t near = 0;
     for (uint32_t i = 0; i < skin->vertex_count && !inside; ++i) {
@@ -138,15 +142,6 @@ static sonde_status begin_at_skin(leg *l, sonde_error *error) {
     turn_z(f, down, scan->left);
   }
   return SONDE_OK;
-}
-
-// Finds the middle of the sections around `row` whose girths differ from that row's by 2 % at most.
-static double middle_of(const leg *l, uint32_t row) {
-  const double girth_m = l->row[row].girth_m;
-  uint32_t low = row, high = row;
-  while (low > 0 && fabs(l->row[low - 1].girth_m / girth_m - 1) < 0.02) --low;
-  while (high + 1 < l->count && fabs(l->row[high + 1].girth_m / girth_m - 1) < 0.02) ++high;
-  return 0.5 * (l->row[low].z_m + l->row[high].z_m);
 }
 
 // Interpolates the skin's girth at a distance below the hip; NaN where no section shows it.
@@ -293,23 +288,37 @@ sonde_status sonde_leg_scan_body(const sonde_leg_scan *scan, uint64_t seed, sond
     uint32_t first = 0;
     while (scan->femur && first < l->count && l->row[first].z_m < l->thigh_m + 6 * STEP_M) ++first;
     // The ankle has the least girth, the heel below it is wider; going up, the girth rises to the
-    // calf, then falls.
+    // calf and mostly falls then.
     uint32_t ankle = first, k;
     for (k = first; k < l->count; ++k)
       if (l->row[k].girth_m < l->row[ankle].girth_m) ankle = k;
+    const double least_m = first < l->count ? l->row[ankle].girth_m : NAN;
     bool widens = false;
-    for (k = ankle; k < l->count && !widens; ++k)
-      widens = l->row[k].girth_m > 1.02 * l->row[ankle].girth_m;
-    uint32_t calf = k = ankle;
-    for (; k > first && l->row[k].girth_m > 0.995 * l->row[calf].girth_m; --k)
+    for (k = ankle; k < l->count && !widens; ++k) widens = l->row[k].girth_m > 1.02 * least_m;
+    uint32_t calf = ankle;
+    for (k = ankle;
+         widens && k > first && !l->falls && l->row[ankle].z_m - l->row[k].z_m < HIGHEST_CALF_M;
+         --k) {
       if (l->row[k].girth_m > l->row[calf].girth_m) calf = k;
-    const bool falls = widens && l->row[k].girth_m <= 0.995 * l->row[calf].girth_m;
-    const bool shown = widens && calf < ankle && (falls || (first > 0 && calf > first));
-    l->calf = calf, l->ankle = ankle, l->calf_shown = shown, l->falls = falls;
-    const double ankle_m = shown ? middle_of(l, l->ankle) : NAN;
+      // At the ankle itself the girth wavers.
+      l->falls = l->row[calf].girth_m > LEAST_CALF * least_m &&
+                 l->row[k].girth_m < 0.995 * l->row[calf].girth_m;
+    }
+    const bool shown = widens && l->row[calf].girth_m > LEAST_CALF * least_m;
+    l->calf = calf, l->ankle = ankle, l->calf_shown = shown;
+    // The ankle's height is the middle of the sections whose girths are within 2 % of the least.
+    uint32_t upper = ankle, lower = ankle;
+    while (upper > 0 && l->row[upper - 1].girth_m < 1.02 * least_m) --upper;
+    while (lower + 1 < l->count && l->row[lower + 1].girth_m < 1.02 * least_m) ++lower;
+    const double ankle_m = shown ? 0.5 * (l->row[upper].z_m + l->row[lower].z_m) : NAN;
     if (shown && scan->femur) l->calf_m = (ankle_m - l->thigh_m) / (ANKLE - 1);
     if (shown && !scan->femur) {
-      l->calf_m = (ankle_m - middle_of(l, l->calf)) / (ANKLE - CALF);
+      // Half-way from the ankle's girth to the calf's the leg is steepest, and its height surest.
+      const double half_m = 0.5 * (least_m + l->row[calf].girth_m);
+      for (k = ankle; l->row[k].girth_m < half_m;) --k;
+      const section *above = &l->row[k], *below = above + 1;
+      const double t = (above->girth_m - half_m) / (above->girth_m - below->girth_m);
+      l->calf_m = (ankle_m - above->z_m - t * (below->z_m - above->z_m)) / (ANKLE - HALF_CALF);
       l->thigh_m = (ankle_m - (ANKLE - 1) * l->calf_m - l->row[0].z_m) / (1 - CREASE);
       l->hip_m = l->row[0].z_m - CREASE * l->thigh_m;
     }

@@ -155,15 +155,6 @@ static void layers_of(const search *s, const double *theta,
   }
 }
 
-static sonde_status press_all(search *s, sonde_error *error) {
-  const sonde_progress progress = {.report = report_part, .user = s};
-  ++s->evaluations;
-  layers_of(s, s->trial.theta, s->solid.layer);
-  const uint32_t workers = sonde_parallel_workers(s->def->threads, s->plan.curve_count);
-  return sonde_parallel_run(s->plan.curve_count, workers, press_curve, s, &progress, s->what,
-                            error);
-}
-
 static void close_search(search *s) {
   standing *both[2] = {&s->now, &s->trial};
   for (int k = 0; k < 2; ++k) {
@@ -302,7 +293,12 @@ static sonde_status evaluate(void *user, double *cost, sonde_error *error) {
     offsets_of(s, c, at);
     for (int k = 0; k < 2; ++k) s->offset[c][k] = at[k] < s->count ? s->trial.theta[at[k]] : 0;
   }
-  const sonde_status status = press_all(s, error);
+  const sonde_progress progress = {.report = report_part, .user = s};
+  ++s->evaluations;
+  layers_of(s, s->trial.theta, s->solid.layer);
+  const uint32_t workers = sonde_parallel_workers(s->def->threads, s->plan.curve_count);
+  const sonde_status status =
+      sonde_parallel_run(s->plan.curve_count, workers, press_curve, s, &progress, s->what, error);
   if (!status) *cost = cost_of(s, &s->trial, NULL);
   return status;
 }

@@ -8,13 +8,6 @@
 #include "base/maths.h"
 #include "sonde/haptics_render.h"
 
-static double stored(const sonde_render *render) {
-  const sonde_render_def *def = &render->def;
-  if (!(def->stiffness_n_m > 0.0)) return 0.0;
-  return 0.5 * def->stiffness_n_m * v_norm2(v_sub(render->probe_m, render->device_m)) +
-         0.5 * def->force_scale * def->probe_mass_kg * v_norm2(render->probe_m_s);
-}
-
 sonde_pose sonde_render_probe(sonde_render *render, sonde_pose world_from_device,
                               sonde_vec3 tissue_force_n, sonde_vec3 rendered_force_n) {
   const sonde_render_def *def = &render->def;
@@ -34,7 +27,10 @@ sonde_pose sonde_render_probe(sonde_render *render, sonde_pose world_from_device
   // generate energy, long before the tissue's own losses would hide that from energy_j.
   double absorbed = -v_dot(rendered_force_n, moved);
   double delivered = -render->def.force_scale * v_dot(tissue_force_n, render->probe_moved_m);
-  double now_stored = stored(render);
+  const double spring_j =
+                   0.5 * def->stiffness_n_m * v_norm2(v_sub(render->probe_m, render->device_m)),
+               motion_j = 0.5 * def->force_scale * def->probe_mass_kg * v_norm2(render->probe_m_s),
+               now_stored = def->stiffness_n_m > 0.0 ? spring_j + motion_j : 0.0;
   render->energy_j += absorbed;
   render->energy_min_j = fmin(render->energy_min_j, render->energy_j);
   render->surplus_j += absorbed - delivered - (now_stored - render->stored_j);
