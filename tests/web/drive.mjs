@@ -27,6 +27,11 @@ export async function singleExams(page) {
   if (await tab.isVisible()) await tab.click();
 }
 
+/** Writes what the page shows, for people to look at, when SONDE_TEST_PICTURES is set: drawing it costs seconds. */
+export const picture = async (page, path, more = {}) => {
+  if (process.env.SONDE_TEST_PICTURES) await page.screenshot({ path, ...more });
+};
+
 /** Puts the probe, lifted, onto the target by dragging there. */
 export async function goTo(page) {
   await page.waitForFunction(() => window.sonde.exam.step.target !== null);

@@ -6,7 +6,7 @@ import { execFileSync } from "node:child_process";
 import { mkdirSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join, resolve } from "node:path";
-import { browserPath } from "./drive.mjs";
+import { browserPath, picture } from "./drive.mjs";
 import { contrastFaults } from "./inspect.mjs";
 
 const [writer, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -92,7 +92,7 @@ async function testExample(name) {
   figuresAgree(name, shown);
   const faults = (await page.evaluate(contrastFaults)).filter((f) => !f.includes('"CLOT"')); // white on the clot's dark red
   check(faults.length === 0, `${name}: text stands out ${faults.slice(0, 3).join("; ")}`);
-  await page.screenshot({ path: join(out, `exam_report_${name}.png`), fullPage: true });
+  await picture(page, join(out, `exam_report_${name}.png`), { fullPage: true });
   const wide = () => page.evaluate(() => document.documentElement.scrollWidth > innerWidth);
   check(!shown.wide, `${name}: fits the window`);
   await page.setViewportSize({ width: 390, height: 800 });

@@ -6,7 +6,7 @@ import { mkdirSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync } f
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, ready, singleExams, turnAcross, turnPatient } from "./drive.mjs";
+import { addressOf, browserPath, goTo, openBrowser, PATIENCE_MS, picture, ready, singleExams, turnAcross, turnPatient } from "./drive.mjs";
 import { FEW_IMAGES, onePlace, startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -74,7 +74,7 @@ async function guidedExam(page) {
     await press(page);
   }
   const { exam } = await state(page);
-  await page.screenshot({ path: join(out, "real_exam.png") });
+  await picture(page, join(out, "real_exam.png"));
   const [asked, shown] = [exam.segments.find((s) => s.id === exam.step.segment), await page.locator("#segments [aria-checked=true] .name").textContent()];
   check(asked?.id === exam.presses.at(-1).segment && shown === asked.title, `the finding asked for is that of the last press, and selected: ${shown}`);
   check(exam.segments.filter((s) => s.needed).every((s) => s.done === s.points), "every place of the protocol was examined");
@@ -97,7 +97,7 @@ async function finish(page) {
   await page.getByRole("button", { name: "Finish and see the result" }).click();
   await until(page, () => window.sonde.exam.result);
   await page.waitForTimeout(500);
-  await page.screenshot({ path: join(out, "real_result.png") });
+  await picture(page, join(out, "real_result.png"));
   return (await state(page)).exam;
 }
 
@@ -110,7 +110,7 @@ async function readReport(browser, port, exam) {
   check(answer.status() === 200, "the report is served");
   const bare = await fetch(`http://127.0.0.1:${port}${exam.result.report.split("?")[0]}`);
   check(bare.status === 401, "but not without its key");
-  await page.screenshot({ path: join(out, "real_report.png"), fullPage: true });
+  await picture(page, join(out, "real_report.png"), { fullPage: true });
   check((await page.locator("img").count()) > 0, "the report shows the learner's own images");
   check(errors.length === 0, `the report has no console error ${errors.join(" ")}`);
   await page.close();
@@ -147,7 +147,7 @@ async function replay(page, exam) {
   const elsewhere = await seek(0.2);
   check(there !== elsewhere, "another moment shows another image");
   check((await seek(0.5)) === there, "the same moment shows the same image again");
-  await page.screenshot({ path: join(out, "real_replay.png") });
+  await picture(page, join(out, "real_replay.png"));
   await page.locator("#replay-leave").click();
   await until(page, () => window.sonde.exam.phase === "practice");
 }
@@ -155,7 +155,7 @@ async function replay(page, exam) {
 async function killed(browser, port) {
   const place = onePlace(); // what is killed is an exam, however many places it has
   const running = await start(port, place);
-  const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
+  const page = await browser.newPage({ viewport: { width: 1024, height: 700 } });
   page.setDefaultTimeout(PATIENCE_MS);
   await page.goto(addressOf(running.learner, "?quality=low"));
   await ready(page);
@@ -177,7 +177,7 @@ async function killed(browser, port) {
 async function main() {
   let running = await start(0);
   const browser = await openBrowser(chromium);
-  const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
+  const page = await browser.newPage({ viewport: { width: 1024, height: 700 } });
   page.setDefaultTimeout(PATIENCE_MS);
   const errors = [];
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));

@@ -6,7 +6,7 @@ import { createRequire } from "node:module";
 import { existsSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import path from "node:path";
-import { addressOf, PATIENCE_MS } from "./drive.mjs";
+import { addressOf, PATIENCE_MS, picture } from "./drive.mjs";
 import { FEW_IMAGES, startRun } from "./program.mjs";
 
 const [, , program, model, webDir, outDir] = process.argv;
@@ -76,13 +76,13 @@ async function testVein(page) {
   check(healthy.vein_area_ratio < 0.15, `the healthy vein closes: ${healthy.vein_area_ratio.toFixed(3)} < 0.15`);
   check(healthy.artery_area_ratio > 0.4, `the artery stays open: ${healthy.artery_area_ratio.toFixed(3)}`);
   check((await page.evaluate(() => window.sonde.imageSum)) !== relaxed, "the image changes");
-  await page.screenshot({ path: path.join(outDir, "press.png") });
+  await picture(page, path.join(outDir, "press.png"));
   await page.getByRole("button", { name: "Chronic" }).click();
   await page.waitForFunction(() => window.sonde.controls.case === "chronic_occlusive");
   let chronic = null;
   for (let i = 0; i < 6; ++i) chronic = await nextSnapshot(page);
   check(chronic.vein_area_ratio > 0.7, `the chronic vein stays open: ${chronic.vein_area_ratio.toFixed(3)} > 0.7`);
-  await page.screenshot({ path: path.join(outDir, "press_chronic.png") });
+  await picture(page, path.join(outDir, "press_chronic.png"));
 }
 
 async function testControls(page) {

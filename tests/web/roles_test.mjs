@@ -6,7 +6,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, openBrowser, PATIENCE_MS, ready, singleExams } from "./drive.mjs";
+import { addressOf, browserPath, openBrowser, PATIENCE_MS, picture, ready, singleExams } from "./drive.mjs";
 import { FEW_IMAGES, onePlace, startRun } from "./program.mjs";
 
 const [sonde, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -23,7 +23,7 @@ const check = (condition, what) => {
 };
 
 async function visit(browser, at, errors) {
-  const page = await (await browser.newContext({ viewport: { width: 1280, height: 800 } })).newPage();
+  const page = await (await browser.newContext({ viewport: { width: 1024, height: 640 } })).newPage();
   page.setDefaultTimeout(PATIENCE_MS);
   page.on("pageerror", (e) => errors.push(String(e)));
   await page.goto(addressOf(at, "?quality=low"));
@@ -55,8 +55,8 @@ async function testTeacher(learner, teacher) {
   await teacher.evaluate(() => window.sonde.setDepth(9));
   await teacher.waitForFunction(() => window.sonde.snapshot.penetration_mm > 8);
   check(true, "the teacher presses");
-  await teacher.screenshot({ path: join(out, "teacher.png") });
-  await learner.screenshot({ path: join(out, "taught.png") });
+  await picture(teacher, join(out, "teacher.png"));
+  await picture(learner, join(out, "taught.png"));
   await role(teacher, "Give control back");
   await has(learner, true);
   check(await learner.evaluate(() => window.sonde.depth > 5), "the learner takes over where the teacher was");
@@ -74,7 +74,7 @@ async function testComments(learner, watcher) {
   await comment(watcher, "Here you press too fast.");
   await watcher.waitForFunction(() => window.sonde.exam.comments.length === 1);
   check((await watcher.locator("#comment-list").innerText()).includes("Here you press too fast."), "a comment is kept while the exam runs");
-  await watcher.screenshot({ path: join(out, "watcher.png") });
+  await picture(watcher, join(out, "watcher.png"));
   await learner.locator("#finish-button").click();
   await learner.getByRole("button", { name: "Finish and see the result" }).click();
   await learner.waitForFunction(() => window.sonde.exam.result);

@@ -4,7 +4,7 @@
 import { createRequire } from "node:module";
 import { mkdirSync, statSync } from "node:fs";
 import path from "node:path";
-import { PATIENCE_MS, browserPath, exams, goTo, openBrowser, ready } from "./drive.mjs";
+import { browserPath, exams, goTo, openBrowser, PATIENCE_MS, picture, ready } from "./drive.mjs";
 import { contrastFaults, layoutFaults, nameFaults } from "./inspect.mjs";
 import { startMock } from "./mock_server.mjs";
 import { REFLUX_S } from "./mock_thigh.mjs";
@@ -72,7 +72,7 @@ async function testPointerExam(page) {
     const before = (await exam(page)).presses.length;
     await page.locator("#ease").click();
     await page.waitForFunction((n) => window.sonde.exam.presses.length > n, before);
-    if (i === 0) await page.screenshot({ path: path.join(outDir, "guided.png") });
+    if (i === 0) await picture(page, path.join(outDir, "guided.png"));
     await page.locator(".finding.compressible").click();
     await page.waitForFunction((n) => window.sonde.exam.segments.filter((s) => s.decision === "compressible").length === n, i + 1);
   }
@@ -326,7 +326,7 @@ async function testCompare(page) {
   await page.waitForFunction(() => window.sonde.snapshot.penetration_mm < 3);
   check((await pixels(1)) === frozen, "before and after stand side by side");
   await inspect(page, "compare");
-  await page.screenshot({ path: path.join(outDir, "compare.png") });
+  await picture(page, path.join(outDir, "compare.png"));
   await button(page, "Compare").click();
   check(await page.locator(".pane").first().isHidden(), "compare ends");
 }
@@ -383,7 +383,7 @@ async function testDuplex(page, mock) {
   const { colour_scale_cm_s: scale, colour_steer_deg: steer } = mock.thigh.controls;
   check(scale === 8 && steer === 20 && mock.thigh.hand.join() === "squeeze,breathe", "scale, lean, squeeze and breath reach the program");
   await inspect(page, "duplex");
-  await page.screenshot({ path: path.join(outDir, "duplex.png") });
+  await picture(page, path.join(outDir, "duplex.png"));
   await page.keyboard.press("Shift+B");
   await page.waitForFunction(() => document.getElementById("duplex-tools").hidden);
 }
@@ -424,7 +424,7 @@ async function testPulsed(page, mock) {
   check(Math.abs(read.peak / 100 - 1) < 0.05 && read.squeezes === 1, `and the peak along the cursor: ${read.peak} cm/s`);
   check(Math.abs(read.augmentation / 4 - 1) < 0.4, `the squeeze augments: ${read.augmentation}`);
   await inspect(page, "pulsed");
-  await page.screenshot({ path: path.join(outDir, "pulsed.png") });
+  await picture(page, path.join(outDir, "pulsed.png"));
   await page.locator("#scene").focus();
   await page.keyboard.press("f");
   await page.keyboard.press("Shift+P");

@@ -9,7 +9,7 @@ import { createRequire } from "node:module";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
-import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, ready, singleExams } from "./drive.mjs";
+import { addressOf, browserPath, findAddress, goTo, openBrowser, PATIENCE_MS, picture, ready, singleExams } from "./drive.mjs";
 import { FEW_IMAGES, onePlace } from "./program.mjs";
 import { Client } from "./socket.mjs";
 
@@ -64,7 +64,7 @@ async function startClass(port) {
 }
 
 async function visit(browser, at, errors) {
-  const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
+  const page = await browser.newPage({ viewport: { width: 1024, height: 640 } });
   page.setDefaultTimeout(PATIENCE_MS);
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));
@@ -118,7 +118,7 @@ async function ends(ada, bo) {
   await until(ada, () => window.sonde.exam.result);
   const [first, second] = [await exam(ada), await exam(bo)];
   check(second.phase === "running" && second.result === null, "one has finished, the other goes on");
-  await bo.screenshot({ path: join(out, "two_learners.png") });
+  await picture(bo, join(out, "two_learners.png"));
   const kept = readdirSync(exams, { withFileTypes: true }).filter((e) => e.isDirectory()).map((e) => e.name);
   const names = (id, name) => readFileSync(join(exams, id, "exam.rec"), "latin1").includes(`"${name}"`); // the journal's setup
   check(kept.length === 2 && names(first.exam, "Ada") && !names(first.exam, "Bo") && names(second.exam, "Bo"), "each exam has its own directory and name");

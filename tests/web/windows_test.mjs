@@ -3,7 +3,7 @@
 import { createRequire } from "node:module";
 import { mkdirSync } from "node:fs";
 import path from "node:path";
-import { browserPath, exams, openBrowser, PATIENCE_MS, ready } from "./drive.mjs";
+import { browserPath, exams, openBrowser, PATIENCE_MS, picture, ready } from "./drive.mjs";
 import { layoutFaults } from "./inspect.mjs";
 import { startMock } from "./mock_server.mjs";
 
@@ -44,7 +44,7 @@ const button = (page, name) => page.getByRole("button", { name, exact: true });
 
 async function look(page, state, [w, h]) {
   await page.waitForTimeout(250);
-  await page.screenshot({ path: path.join(outDir, `${state.replace(/ /g, "_")}_${w}x${h}.png`) });
+  await picture(page, path.join(outDir, `${state.replace(/ /g, "_")}_${w}x${h}.png`));
   const where = `${state} at ${w} x ${h}`;
   const tiny = await page.evaluate(small);
   check(tiny.length === 0, `${where}: every target has 24 px${tiny.map((t) => `\n       ${t}`).join("")}`);
@@ -136,7 +136,7 @@ async function testNoWebGl(mock) {
   check(await page.locator("#flat-note").isVisible(), "without WebGL: the page says so");
   const seen = await painted(page);
   check(seen.share > 0.1 && seen.share < 0.9 && seen.blue > 50, `without WebGL: the leg is drawn on ${(100 * seen.share).toFixed(0)} % of the stage, with its vein`);
-  await page.screenshot({ path: path.join(outDir, "no_webgl.png") });
+  await picture(page, path.join(outDir, "no_webgl.png"));
   check(errors.length === 0, `without WebGL: nothing fails ${errors.slice(0, 2).join("; ")}`);
   await browser.close();
 }
@@ -159,7 +159,7 @@ async function testLostContext(browser, mock) {
   await page.evaluate(() => window.lose.restoreContext());
   await page.locator("#scene-flat").waitFor({ state: "hidden" });
   await goesOn(page, "with the context restored");
-  await page.screenshot({ path: path.join(outDir, "restored.png") });
+  await picture(page, path.join(outDir, "restored.png"));
   await page.close();
 }
 
@@ -172,7 +172,7 @@ async function testOffline(browser, mock) {
     await page.waitForFunction(() => Number.parseFloat(document.getElementById("force-value").textContent) > 1);
     mock.drop();
     await page.waitForFunction(() => !window.sonde.connected);
-    await page.screenshot({ path: path.join(outDir, `offline_${size.join("x")}.png`) });
+    await picture(page, path.join(outDir, `offline_${size.join("x")}.png`));
     const shown = await page.evaluate(() => ({
       grey: getComputedStyle(document.querySelector(".pane")).filter.includes("grayscale") && Number(getComputedStyle(document.querySelector(".pane")).opacity) < 0.6,
       force: document.getElementById("force-value").textContent, word: document.getElementById("force-word").textContent,
