@@ -17,6 +17,7 @@ enum { MAX_PROBES = 16 };
 typedef struct options {
   const char *model, *record, *probe, *pathology, *preset, *compare;
   const char *trainee, *exams, *cases, *protocols, *course, *scanner;
+  const char *igtl, *push;
   long port, images_hz;
   double seconds, gel_m3;
   bool headless, lockstep, json, no_gel, circulate;
@@ -83,6 +84,11 @@ static const app_option TABLE[] = {
              "of the maker's driver, when it is not the usual one"),
     OPT_INTEGER(device.port, "device-port", "N", 1, 65535,
                 "of the maker's driver, when it is not the usual one"),
+    OPT_TEXT(igtl, "igtl", "[ADDRESS:]PORT",
+             "serve pictures, poses and forces by OpenIGTLink (docs/stream_igtl.md), on 127.0.0.1 "
+             "unless an address is given; 18944 is its usual port, 0: any free one"),
+    OPT_TEXT(push, "push", "HOST:PORT",
+             "send the same to a reader that listens itself, again every second until it is there"),
     OPT_TEXT(trainee, "trainee", "NAME",
              "whose exams they are; default: $SONDE_TRAINEE, else as the page says"),
     OPT_TEXT(exams, "exams", "DIR",
@@ -105,6 +111,43 @@ typedef struct summary {
   uint64_t ticks, images, hash;
   sonde_loop_stats loop;
 } summary;
+
+// Whom frames go to by OpenIGTLink; NULL: nobody.
+static sonde_igtl_server *listeners = NULL;
+
+static void post_frame(void *user, const sonde_frame *frame) {
+  (void)sonde_igtl_post(user, frame); // without memory this frame is not sent
+}
+
+// Serves what --igtl and --push say; every image of the sessions goes there.
+static sonde_status serve_igtl(const options *s, sonde_session_def *def, sonde_error *error) {
+  char address[64];
+  sonde_igtl_def igtl = {.push = s->push, .listen = s->igtl};
+  if (s->igtl) {
+    const char *colon = strrchr(s->igtl, ':'), *number = colon ? colon + 1 : s->igtl;
+    char *end;
+    const long port = strtol(number, &end, 10);
+    if (number[0] < '0' || number[0] > '9' || *end || port > 65535 ||
+        (colon && (size_t)(colon - s->igtl) >= sizeof address))
+      return app_error(error, SONDE_ARGUMENT,
+                       "--igtl expects a port from 0 to 65535 or ADDRESS:PORT, found '%s'",
+                       s->igtl);
+    if (colon) {
+      snprintf(address, sizeof address, "%.*s", (int)(colon - s->igtl), s->igtl);
+      igtl.address = address;
+    }
+    igtl.port = (uint16_t)port;
+  }
+  sonde_status status = sonde_igtl_start(&igtl, &listeners, error);
+  if (status) return status;
+  def->watch = post_frame;
+  def->watch_user = listeners;
+  // To stderr: the only line on stdout is the JSON object.
+  if (s->igtl)
+    fprintf(stderr, "OpenIGTLink on %s port %u\n", igtl.address ? igtl.address : "127.0.0.1",
+            (unsigned)sonde_igtl_port(listeners));
+  return SONDE_OK;
+}
 
 static int check(void *from) {
   options *s = from;
@@ -258,6 +301,13 @@ static void print_summary(const options *s, const summary *seen) {
     }
     app_json("penetration_max_mm:%g vein_area_ratio_min:%g", 1e3 * seen->penetration_max_m,
              seen->vein_ratio_min);
+    if (listeners) {
+      const sonde_igtl_counts sent = sonde_igtl_counted(listeners);
+      app_json_object("igtl");
+      app_json("frames:%lu clients:%u sent:%lu replaced:%lu", sent.frames, sent.joined, sent.sent,
+               sent.replaced);
+      app_json_close();
+    }
     if (s->record) app_json_text("recording", s->record);
     app_json_end();
     return;
@@ -285,6 +335,12 @@ static void print_summary(const options *s, const summary *seen) {
         "the probe was led through the leg %u times: it was taken off until it had left the leg, "
         "with no force and no image\n",
         seen->restores);
+  if (listeners) {
+    const sonde_igtl_counts sent = sonde_igtl_counted(listeners);
+    printf("OpenIGTLink: %llu frames, %u clients, %llu sent, %llu replaced by newer ones\n",
+           (unsigned long long)sent.frames, sent.joined, (unsigned long long)sent.sent,
+           (unsigned long long)sent.replaced);
+  }
   if (s->record) printf("recorded to %s\n", s->record);
 }
 
@@ -397,6 +453,7 @@ static int run(void *from) {
   }
   for (int k = 0; k < SONDE_SESSION_PRESETS && presets[k] && !status; ++k)
     status = sonde_preset_load(presets[k], &def.presets[def.preset_count++], &error);
+  if (!status && (s->igtl || s->push)) status = serve_igtl(s, &def, &error);
   if (status) {
     code = app_fail("run", &error);
   } else {
@@ -407,6 +464,7 @@ static int run(void *from) {
     else if (run_exams(s, model, &def, &error))
       code = app_fail("run", &error);
   }
+  sonde_igtl_stop(listeners);
   free(absolute);
   sonde_model_destroy(model);
   return code;

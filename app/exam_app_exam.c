@@ -36,6 +36,7 @@ static void watch(void *user, const sonde_frame *frame) {
   if (of->turns) exam_hold(of, of->turns_to);
   exam_observe(of, frame);
   pthread_mutex_unlock(of->lock);
+  if (of->also) of->also(of->also_user, frame);
 }
 
 // The session of a part of the exam, with the probe above the first place of the patient's
@@ -53,6 +54,7 @@ static sonde_status begin_part(exam_app *app, exam *of, uint32_t held, uint32_t 
   def.record_path = recording;
   def.record_setup = setup;
   if (of->lesson && of->lesson->doppler) def.controls.duplex.shown = SONDE_DUPLEX_VELOCITY;
+  of->also = def.watch, of->also_user = def.watch_user;
   def.watch = watch;
   def.watch_user = of;
   sonde_vein_point first = sonde_vein_at(&lies->map, 0.0);

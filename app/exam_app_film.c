@@ -85,6 +85,7 @@ static sonde_status lay(exam_app *app, exam_film *film, uint32_t held, sonde_dev
   sonde_case_session(setup, &def);
   def.model_path = def.record_path = NULL;
   def.ticks_per_image = TICKS_PER_IMAGE;
+  def.watch = NULL; // its images are made ahead of what is shown
   if (film->lesson->doppler) def.controls.duplex.shown = SONDE_DUPLEX_VELOCITY;
   sonde_status status = sonde_session_create(&def, device, &next, error);
   if (!status)

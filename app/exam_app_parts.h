@@ -63,7 +63,9 @@ typedef struct exam {
   bool noted, in_journal, filed, logged; // the score is a note; on the disk: inputs; files; row
   bool gap_told;                         // that inputs are missing
   double retry_s;                        // clock of the next attempt to write
-  pthread_mutex_t *lock;                 // the application's
+  void (*also)(void *user, const sonde_frame *frame); // gets every image too; NULL: nobody
+  void *also_user;
+  pthread_mutex_t *lock; // the application's
   // under the lock
   uint32_t held, turns_to; // setup in whose position the patient is; is from the next image on
   bool turns;

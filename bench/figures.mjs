@@ -242,6 +242,11 @@ const GROUPS = {
       }
     },
   },
+  // Frames that readers of OpenIGTLink get at 60 Hz beside one that never reads.
+  igtl: {
+    sources: ['src/sonde-exam/stream/igtl_message.c', 'src/sonde-exam/stream/igtl_server.c', 'bench/bench_igtl.c', 'bench/igtl.py'],
+    measure: bin => python(bin, 'bench/igtl.py', bin),
+  },
   // Laws of 200 limbs: sums of faults, shares of limbs whose view is true, and of those of BMI 20 to 35 whose depth is in its band and at most 5 mm beyond it.
   limb: {
     sources: ['src/sonde-limb', 'bench/bench_limb.c', 'bench/limb_laws.c'],

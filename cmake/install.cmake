@@ -43,6 +43,7 @@ sonde_pc(sonde-exam OF sonde-fit sonde-solid sonde-limb sonde-sweep sonde-files 
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/thigh ${PROJECT_SOURCE_DIR}/data/scenes
   ${PROJECT_SOURCE_DIR}/data/cases ${PROJECT_SOURCE_DIR}/data/course ${PROJECT_SOURCE_DIR}/data/protocols ${PROJECT_SOURCE_DIR}/data/scanners
+  ${PROJECT_SOURCE_DIR}/data/openigtlink
   DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde/data)
 if(TARGET thigh)
   install(FILES ${SONDE_BUNDLED_MODEL} DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde)

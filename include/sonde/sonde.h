@@ -65,5 +65,6 @@
 #include "sonde/trainer_report.h"
 #include "sonde/dataset.h"
 #include "sonde/stream.h"
+#include "sonde/stream_igtl.h"
 
 #endif

@@ -4,59 +4,31 @@
 // room by closing the oldest connection that is no client, so that connections which never finish
 // their request cost nobody else anything.
 #include "stream/page_server.h"
+#include "stream/port.h"
 
 #include "base/clock.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
+#include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
 #include <unistd.h>
 
 enum {
-  BACKLOG = 128,
   ADMITTED = 64,    // new connections in one round
   ROUND_MS = 100,   // longest wait: the stages' ends are looked at ten times a second
   THROWN = 1 << 16, // bytes read and thrown away in one round, of a connection that ends
 };
 
-// ---- the port
-
-static sonde_status port_failure(uint16_t port, int problem, sonde_error *error) {
-  if (problem == EADDRINUSE)
-    return sonde_fail(error, SONDE_PORT,
-                      "port %u on 127.0.0.1 is in use by another program; expected a free port, "
-                      "or 0 for any free one",
-                      (unsigned)port);
-  return sonde_fail(error, SONDE_PORT, "port %u on 127.0.0.1 cannot be opened: %s", (unsigned)port,
-                    strerror(problem));
-}
-
 sonde_status page_net_open(sonde_page_server *server, uint16_t port, sonde_error *error) {
-  struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(port)};
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  int one = 1;
-  server->listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  server->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (server->listener < 0 || server->wake < 0) return port_failure(port, errno, error);
-  setsockopt(server->listener, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-  if (bind(server->listener, (struct sockaddr *)&address, sizeof address) ||
-      listen(server->listener, BACKLOG) ||
-      getsockname(server->listener, (struct sockaddr *)&address, &size))
-    return port_failure(port, errno, error);
-  server->port = ntohs(address.sin_port);
-  return SONDE_OK;
+  server->port = port;
+  return stream_port_open("127.0.0.1", &server->port, &server->listener, &server->wake, error);
 }
 
-void page_wake(sonde_page_server *server) {
-  const uint64_t one = 1;
-  (void)!write(server->wake, &one, sizeof one); // a full counter wakes as well
-}
+void page_wake(sonde_page_server *server) { stream_port_wake(server->wake); }
 
 // ---- ends
 
