@@ -82,7 +82,8 @@ typedef enum sonde_tissue {
   SONDE_TISSUE_TENDON,
   SONDE_TISSUE_NERVE,
   SONDE_TISSUE_NODE, /**< lymph node */
-  SONDE_TISSUE_BONE
+  SONDE_TISSUE_BONE,
+  SONDE_TISSUE_CUSPS /**< the two cusps of a vein's valve: a body, no tissue of a point */
 } sonde_tissue;
 
 /** Signed distances of a rest point, m; negative inside. */
@@ -109,11 +110,13 @@ typedef struct sonde_map_seed {
   double lean;          /**< of the fibres: way outward per way along z, from the belly's axis */
 } sonde_map_seed;
 
-/** A nerve, tendon or lymph node. */
+/** A nerve, tendon, lymph node or a valve's cusps. */
 typedef struct sonde_map_body {
   sonde_tissue tissue;
-  sonde_vec3 axis;   /**< unit, along it */
-  sonde_vec3 half_m; /**< semi-axes across, the wide and the thick one, and along it; 0: a cord */
+  sonde_vec3 axis; /**< unit, along it */
+  /** Semi-axes across, the wide and the thick one, and along it; 0: a cord. Of cusps: the lumen's
+   * radius twice and their length. */
+  sonde_vec3 half_m;
 } sonde_map_body;
 
 /**
@@ -133,14 +136,16 @@ typedef struct sonde_tissue_map {
   /** |p - seed|^2 - weight of seeds at a rest point, m^2, and where the seeds are there. */
   void (*powers)(const void *self, sonde_vec3 rest_m, uint32_t count, const uint32_t *seed,
                  double *power_m2, sonde_vec3 *at_m);
-  /** Nerves, tendons and nodes that come within a distance of a point, at most `room`; their
-   * number.
+  /** Nerves, tendons, nodes and cusps that come within a distance of a point, at most `room`;
+   * their number.
    */
   uint32_t (*bodies)(const void *self, sonde_vec3 rest_m, double within_m, uint32_t room,
                      uint32_t *body);
   /** Facts of a body where it comes nearest to a point. */
   sonde_map_body (*body)(const void *self, uint32_t body, sonde_vec3 rest_m);
-  /** Place of a point in a body over its semi-axes; along a cord in m. Far beyond its end. */
+  /** Place of a point in a body over its semi-axes; along a cord in m. Far beyond its end. Of
+   * cusps: across the lumen from one to the other, beside that, and from their roots towards the
+   * heart. */
   sonde_vec3 (*body_place)(const void *self, uint32_t body, sonde_vec3 rest_m);
   void (*destroy)(struct sonde_tissue_map *map);
 } sonde_tissue_map;

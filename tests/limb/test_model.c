@@ -3,6 +3,7 @@
 #include "limb_test.h"
 
 #include "sonde/limb_model.h"
+#include "sonde/sonde.h"
 
 #include <string.h>
 
@@ -148,6 +149,104 @@ static void bodies_are_those_of_the_labels(void **state) {
   }
 }
 
+// The mean grey of the picture across a vein, from 0.15 to 0.85 of its radius on both sides of its
+// middle. The beam looks at the vein from the skin over it.
+static double lumen_grey(sonde_echo *echo, const sonde_model *m, sonde_vec3 middle, sonde_vec3 up,
+                         double radius_m) {
+  sonde_vec3 beam = vec3(-middle.x, -middle.y, 0);
+  beam = v_unit(v_madd(beam, -v_dot(beam, up), up), vec3(0, 1, 0));
+  sonde_vec3 face = middle;
+  sonde_tissue_depths d = {0};
+  for (int k = 0; k < 60; ++k) {
+    m->map->depths(m->map->self, face, &d);
+    face = v_madd(face, d.skin_m, beam);
+  }
+  const sonde_pose pose = {face, q_from_matrix(m_columns(v_cross(up, beam), up, beam))};
+  sonde_pathology healthy;
+  sonde_echo_settings settings = sonde_echo_settings_default();
+  sonde_image image;
+  enum { SIZE = 400 };
+  assert_int_equal(sonde_pathology_preset("healthy", &healthy, NULL), SONDE_OK);
+  assert_int_equal(sonde_image_create(SIZE, SIZE, &image, NULL), SONDE_OK);
+  settings.depth_m = 0.06;
+  sonde_echo_render(echo, pose, 0.03, &healthy, &settings, &image);
+  const double per_m = SIZE / image.height_m, reach = radius_m * per_m,
+               deep = v_dot(v_sub(middle, face), beam) * per_m;
+  double sum = 0;
+  uint32_t count = 0;
+  for (int y = (int)(deep - 0.85 * reach); y < deep + 0.85 * reach; ++y)
+    for (int x = SIZE / 2 - 12; fabs(y - deep) > 0.15 * reach && x < SIZE / 2 + 12; ++x)
+      sum += image.pixels[y * SIZE + x], ++count;
+  sonde_image_clear(&image);
+  return sum / count;
+}
+
+// Each valve's cusps are a body rooted on the vein's middle, whose length runs along the vein
+// towards the heart; a section through them is brighter inside than one below their roots.
+static void cusps_stand_in_their_veins(void **state) {
+  (void)state;
+  uint32_t seen = 0, shown = 0, brighter = 0;
+  for (uint32_t k = 0; k < MODELS; ++k) {
+    const sonde_model *m = model[k];
+    const sonde_limb *limb = sonde_limb_of(m);
+    const sonde_tissue_map *map = m->map;
+    sonde_interior *in = NULL;
+    sonde_echo *echo = NULL;
+    sonde_pathology healthy;
+    sonde_vec3 *still = SONDE_NEW(sonde_vec3, m->surface.vertex_count);
+    assert_int_equal(sonde_interior_create(m, &in, NULL), SONDE_OK);
+    sonde_interior_set_method(in, SONDE_INTERIOR_COLUMNS);
+    assert_int_equal(sonde_pathology_preset("healthy", &healthy, NULL), SONDE_OK);
+    assert_int_equal(sonde_echo_create(in, NULL, &echo, NULL), SONDE_OK);
+    sonde_interior_update(in, &(sonde_interior_input){.positions_m = m->surface.vertices,
+                                                      .contact_forces_n = still,
+                                                      .world_from_probe = {{0, 0, 0}, {1, 0, 0, 0}},
+                                                      .pathology = &healthy,
+                                                      .dt_s = -1,
+                                                      .tick = 1,
+                                                      .face_half_x_m = 0.02,
+                                                      .face_half_y_m = 0.01});
+    for (uint32_t v = 0; v < sonde_limb_vessel_count(limb); ++v) {
+      const sonde_limb_vessel vessel = sonde_limb_vessel_get(limb, v);
+      for (uint32_t n = 0; n < vessel.valves; ++n) {
+        const sonde_limb_valve valve = sonde_limb_vessel_valve(limb, v, n);
+        const double above = fmax(valve.arc_m - 0.8 * valve.cusp_m, 0);
+        const sonde_limb_vessel_point at = sonde_limb_vessel_place(limb, v, valve.arc_m),
+                                      next = sonde_limb_vessel_place(limb, v, above);
+        const sonde_vec3 root = sonde_limb_to_model(limb, at.centre_m),
+                         end = sonde_limb_to_model(limb, next.centre_m);
+        enum { ROOM = 64 };
+        uint32_t id[ROOM], found = 0;
+        const uint32_t count = map->bodies(map->self, root, 0.002, ROOM, id);
+        for (uint32_t i = 0; i < count; ++i) {
+          const sonde_vec3 q = map->body_place(map->self, id[i], root),
+                           e = map->body_place(map->self, id[i], end);
+          const sonde_map_body b = map->body(map->self, id[i], root);
+          if (b.tissue != SONDE_TISSUE_CUSPS || v_norm(q) > 1e-6) continue;
+          ++found;
+          assert_near(b.half_m.z, valve.cusp_m, 1e-9);
+          if (above > 0)
+            assert_true(e.z > 0.6 && e.z < 0.81 && v_dot(b.axis, v_sub(end, root)) > 0);
+          if (k || !(strcmp(vessel.name, "femoral vein") == 0) || above <= 0) continue;
+          const double grey = lumen_grey(echo, m, end, b.axis, at.radius_m),
+                       below =
+                           lumen_grey(echo, m, v_madd(root, -2e-3, b.axis), b.axis, at.radius_m);
+          print_message("%s, %.0f mm: grey %.1f through the cusps, %.1f below\n", vessel.name,
+                        1e3 * valve.arc_m, grey, below);
+          ++shown, brighter += grey > below + 3;
+        }
+        assert_int_equal(found, 1);
+        ++seen;
+      }
+    }
+    sonde_echo_destroy(echo);
+    sonde_interior_destroy(in);
+    sonde_free(still);
+  }
+  print_message("%u valves, %u of %u brighter\n", seen, brighter, shown);
+  assert_true(seen > 150 && shown >= 2 && brighter == shown);
+}
+
 static void springs_follow_the_tissue_below(void **state) {
   (void)state;
   for (uint32_t k = 0; k < MODELS; ++k) {
@@ -256,6 +355,7 @@ int main(void) {
       cmocka_unit_test(surfaces_are_closed_and_the_map_lies_on_them),
       cmocka_unit_test(powers_are_those_of_the_labels),
       cmocka_unit_test(bodies_are_those_of_the_labels),
+      cmocka_unit_test(cusps_stand_in_their_veins),
       cmocka_unit_test(springs_follow_the_tissue_below),
       cmocka_unit_test(vessels_run_down_under_their_landmarks),
       cmocka_unit_test(a_left_model_is_the_mirror),

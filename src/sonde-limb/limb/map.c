@@ -196,6 +196,10 @@ static uint32_t bodies(const void *self, sonde_vec3 rest, double within_m, uint3
       found[count++] = k;
       break;
     }
+  // Cusps are numbered behind nerves and tendons.
+  for (uint32_t k = 0; k < held->cusp_count && count < room; ++k)
+    if (v_distance(held->cusps[k].root, p) < within_m + held->cusps[k].length_m)
+      found[count++] = nerves + limb_tendon_count() + k;
   return count;
 }
 
@@ -203,10 +207,17 @@ static sonde_map_body body(const void *self, uint32_t which, sonde_vec3 rest) {
   const limb_held *held = self;
   const sonde_limb *limb = held->limb;
   const sonde_vec3 p = in_limb(held, rest);
+  const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
+  const uint32_t cords = nerves + limb_tendon_count();
+  if (which >= cords) {
+    const limb_cusps *c = &held->cusps[which - cords];
+    return (sonde_map_body){.tissue = SONDE_TISSUE_CUSPS,
+                            .axis = v_unit(in_model(held, c->root, c->up), vec3(0, 0, -1)),
+                            .half_m = {c->radius_m, c->radius_m, c->length_m}};
+  }
   const limb_body b = nearest(limb, which, p);
   sonde_vec3 axis = in_model(held, p, b.axis);
   if (held->pose) axis = v_unit(axis, vec3(0, 0, 1));
-  const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
   return (sonde_map_body){.tissue = b.node           ? SONDE_TISSUE_NODE
                                     : which < nerves ? SONDE_TISSUE_NERVE
                                                      : SONDE_TISSUE_TENDON,
@@ -219,6 +230,13 @@ static sonde_vec3 body_place(const void *self, uint32_t which, sonde_vec3 rest) 
   const sonde_limb *limb = held->limb;
   const sonde_vec3 p = in_limb(held, rest), outside = vec3(FAR_AWAY, FAR_AWAY, 0);
   const uint32_t nerves = limb->vessels ? limb_nerve_bodies(limb->vessels) : 0;
+  const uint32_t cords = nerves + limb_tendon_count();
+  if (which >= cords) {
+    const limb_cusps *c = &held->cusps[which - cords];
+    const sonde_vec3 d = v_sub(p, c->root);
+    return vec3(v_dot(d, c->out) / c->radius_m, v_dot(d, v_cross(c->up, c->out)) / c->radius_m,
+                v_dot(d, c->up) / c->length_m);
+  }
   if (which >= nerves) {
     const double level = clamp(limb_level(limb, p.z), LIMB_TOP, 2);
     const sonde_vec3 c = limb_centre(limb, level);
@@ -237,6 +255,7 @@ static sonde_vec3 body_place(const void *self, uint32_t which, sonde_vec3 rest) 
 void limb_held_clear(limb_held *held) {
   sonde_limb_pose_destroy(held->pose);
   sonde_limb_destroy(held->limb);
+  sonde_free(held->cusps);
   *held = (limb_held){0};
 }
 
@@ -252,16 +271,38 @@ const limb_held *limb_map_held(const sonde_tissue_map *map) {
 
 sonde_status limb_map_create(const limb_held *held, sonde_tissue_map **map, sonde_error *error) {
   SONDE_ASSERT(held->limb && map);
+  const sonde_limb *limb = held->limb;
+  const uint32_t vessels = limb->vessels ? sonde_limb_vessel_count(limb) : 0;
+  uint32_t valves = 0;
+  for (uint32_t v = 0; v < vessels; ++v) valves += sonde_limb_vessel_get(limb, v).valves;
   limb_held *self = SONDE_NEW(limb_held, 1);
+  limb_cusps *cusps = SONDE_NEW(limb_cusps, valves + 1);
   *map = SONDE_NEW(sonde_tissue_map, 1);
-  if (!*map || !self) {
+  if (!*map || !self || !cusps) {
     sonde_free(*map);
     sonde_free(self);
+    sonde_free(cusps);
     *map = NULL;
     return sonde_fail_memory(error);
   }
   static atomic_uint_least64_t made;
   *self = *held;
+  self->cusps = cusps;
+  // Cusps face each other across the vein on the line from the limb's middle, so that their edges
+  // run along the skin.
+  for (uint32_t v = 0; v < vessels; ++v) {
+    const uint32_t count = sonde_limb_vessel_get(limb, v).valves;
+    for (uint32_t k = 0; k < count; ++k) {
+      const sonde_limb_valve valve = sonde_limb_vessel_valve(limb, v, k);
+      const sonde_limb_vessel_point at = sonde_limb_vessel_place(limb, v, valve.arc_m);
+      const sonde_vec3 root = limb_side_point(limb, at.centre_m);
+      const sonde_vec3 up = limb_side_point(limb, v_scale(at.direction, -1));
+      const sonde_vec3 c = limb_centre(limb, clamp(limb_level(limb, root.z), LIMB_TOP, 2));
+      const sonde_vec3 away = vec3(root.x - c.x, root.y - c.y, 0);
+      const sonde_vec3 out = v_unit(v_madd(away, -v_dot(away, up), up), vec3(0, 1, 0));
+      cusps[self->cusp_count++] = (limb_cusps){root, up, out, at.radius_m, valve.cusp_m};
+    }
+  }
   self->number = atomic_fetch_add(&made, 1) + 1;
   **map = (sonde_tissue_map){.self = self,
                              .depths = depths,

@@ -149,9 +149,14 @@ typedef struct tissue_cell {
   float section;    // number of the compartment: a septum parts two
 } tissue_cell;
 
-typedef enum tissue_body_kind { TISSUE_NERVE, TISSUE_TENDON, TISSUE_LYMPH } tissue_body_kind;
+typedef enum tissue_body_kind {
+  TISSUE_NERVE,
+  TISSUE_TENDON,
+  TISSUE_LYMPH,
+  TISSUE_CUSPS
+} tissue_body_kind;
 
-// A nerve, tendon or lymph node of a tissue map.
+// A nerve, tendon or lymph node of a tissue map, or a valve's cusps.
 typedef struct tissue_body {
   tissue_body_kind kind;
   float half_m[3]; // semi-axes; along a cord 1

@@ -86,7 +86,7 @@ INLINE void bodies(const tissue_job *job, const tissue_point *p, const float *fi
     }
     floats square = q[0] * q[0] + q[1] * q[1];
     ints in = square < 1;
-    if (!vany(in)) continue;
+    if (it->kind == TISSUE_CUSPS || !vany(in)) continue;
     const float square_on = it->facing * it->facing, fourth = square_on * square_on;
     if (it->kind == TISSUE_NERVE) {
       // A honeycomb: three waves across the nerve at 60 degrees, which sway along it.

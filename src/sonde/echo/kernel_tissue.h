@@ -140,7 +140,8 @@ INLINE ints paint(const tissue_job *job, uint32_t l) {
     edge[k] = lesion_distance(&job->lesion[k], q);
     lesion(&job->lesion[k], point.memory, q, edge[k], theta, s, depth, tissue);
   }
-  vessels(job, point.memory, f, wall, job->before + LAYER_LEVELS * n + l, tissue);
+  vessels(job, point.memory, f, map + (1 + job->cells) * n, wall,
+          job->before + LAYER_LEVELS * n + l, tissue);
   mark(level[3] > 0, vset(bone_tissue[0]), bone_tissue[1], tissue);
   mark(level[0] < 0, vset(0), outside_loss, tissue);
   vstore(job->scatter + l, tissue[0]), vstore(job->loss + l, tissue[1]);
