@@ -199,6 +199,40 @@ static void recovered_nodes_are_in_equilibrium(void **state) {
   clear(&b);
 }
 
+// In single precision, by all instruction sets alike.
+static void single_fronts_condense_to_single_precision(void **state) {
+  (void)state;
+  static const char *const SETS[] = {"base", "avx2", "avx512"};
+  block b = make();
+  factored exact = factored_block(&b), single = {.symbolic = exact.symbolic};
+  single.numeric.single = true;
+  assert_int_equal(sonde_numeric_reserve(&single.numeric, single.symbolic, NULL), SONDE_OK);
+  factor(&exact, &b, UINT64_MAX);
+  const double *want = sonde_numeric_condensed(&exact.numeric);
+  const uint32_t side = 3 * LAST;
+  float first[9 * LAST * LAST];
+  for (size_t k = 0; k < sizeof SETS / sizeof SETS[0]; ++k) {
+    double most = 0, off = 0;
+    single.numeric.kernels = sonde_dense_kernels_find(SETS[k]);
+    if (!single.numeric.kernels) continue;
+    factor(&single, &b, k == 0 ? UINT64_MAX : 2000);
+    assert_false(single.numeric.failed);
+    const float *got = sonde_numeric_condensed_single(&single.numeric);
+    for (uint32_t j = 0; j < side; ++j)
+      for (uint32_t i = j; i < side; ++i) {
+        most = fmax(most, fabs(want[j * side + i]));
+        off = fmax(off, fabs((double)got[j * side + i] - want[j * side + i]));
+        if (k == 0) first[j * side + i] = got[j * side + i];
+        assert_memory_equal(&got[j * side + i], &first[j * side + i], sizeof *got);
+      }
+    assert_true(most > 0 && off < 3e-6 * most);
+    if (k == 0) print_message("condensed in single precision: off by %.1e\n", off / most);
+  }
+  sonde_numeric_clear(&single.numeric);
+  factored_clear(&exact);
+  clear(&b);
+}
+
 static void shares_of_work_change_nothing(void **state) {
   (void)state;
   block b = make();
@@ -403,10 +437,20 @@ static double *matrix_of(uint32_t n) {
   return f;
 }
 
-static void eliminated(const sonde_dense_kernels *set, double *f, uint32_t n) {
+static float *single_of(const double *f, uint32_t n) {
+  float *g = calloc((size_t)n * sonde_front_stride(n), sizeof *g);
+  assert_non_null(g);
+  for (size_t k = 0; k < n * sonde_front_stride(n); ++k) g[k] = (float)f[k];
+  return g;
+}
+
+static void eliminated(const sonde_dense_kernels *set, double *f, float *g, uint32_t n) {
   uint32_t own = 2 * n / 3;
-  for (uint32_t from = 0; from < own; from += 45)
-    assert_true(set->eliminate(f, n, from, from + 45 < own ? from + 45 : own));
+  for (uint32_t from = 0; from < own; from += 45) {
+    const uint32_t to = from + 45 < own ? from + 45 : own;
+    assert_true(set->eliminate(f, n, from, to));
+    assert_true(set->eliminate_single(g, n, from, to));
+  }
 }
 
 // Fewer rows than a vector has, more than a band, and what divides by nothing.
@@ -420,12 +464,18 @@ static void every_instruction_set_gives_the_same_bits(void **state) {
     for (size_t q = 0; q < sizeof SIZES / sizeof SIZES[0]; ++q) {
       uint32_t n = SIZES[q];
       double *a = matrix_of(n), *b = matrix_of(n);
-      eliminated(&sonde_dense_kernels_base, a, n);
-      eliminated(wide, b, n);
+      float *c = single_of(a, n), *d = single_of(a, n);
+      eliminated(&sonde_dense_kernels_base, a, c, n);
+      eliminated(wide, b, d, n);
       for (size_t j = 0; j < n; ++j) {
         size_t at = j * sonde_front_stride(n) + j;
         assert_memory_equal(a + at, b + at, (n - j) * sizeof *a);
+        assert_memory_equal(c + at, d + at, (n - j) * sizeof *c);
+        for (size_t i = j; i < n; ++i)
+          assert_true(fabs((double)c[at + i - j] - a[at + i - j]) < 3e-6 * n);
       }
+      free(c);
+      free(d);
       free(a);
       free(b);
     }
@@ -448,6 +498,7 @@ static void every_instruction_set_gives_the_same_bits(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(condensed_is_the_schur_complement),
                                      cmocka_unit_test(recovered_nodes_are_in_equilibrium),
+                                     cmocka_unit_test(single_fronts_condense_to_single_precision),
                                      cmocka_unit_test(shares_of_work_change_nothing),
                                      cmocka_unit_test(a_bad_pivot_is_reported),
                                      cmocka_unit_test(bad_numbers_are_refused),

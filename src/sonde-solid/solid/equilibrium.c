@@ -1,6 +1,5 @@
 // A solid with a probe: what may touch, the way of the probe in steps, reading the inside.
 #include "equilibrium.h"
-#include "hex.h"
 
 #include "base/base.h"
 #include "elements/hexahedron.h"
@@ -59,7 +58,7 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
   SONDE_ASSERT(mesh != NULL && mesh->count > 0 && equilibrium != NULL);
   sonde_equilibrium *e = *equilibrium = SONDE_NEW(sonde_equilibrium, 1);
   if (!e) return sonde_fail_memory(error);
-  e->mesh = mesh, e->def = *def;
+  e->mesh = mesh, e->def = *def, e->kernels = sonde_hex_kernels_find(NULL);
   const uint32_t nodes = mesh->node_count, *lines = mesh->lines, sheet = lines[1] * lines[2];
   e->unknown = SONDE_NEW(uint32_t, nodes);
   e->zone_node = SONDE_NEW(uint32_t, nodes);
@@ -105,11 +104,11 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
                         &e->touch, &e->right, &e->touch_trial, &e->schur,     &e->matrix};
   const size_t size[] = {count, count, side, side,        side,
                          side,  side,  side, side * side, side * side};
-  bool all = true;
+  e->front = SONDE_NEW(float, sonde_front_stride((uint32_t)side) * side);
+  bool all = e->front != NULL;
   for (size_t k = 0; k < SONDE_COUNT_OF(vectors); ++k)
     all &= (*vectors[k] = SONDE_NEW(double, size[k])) != NULL;
-  e->imposed = SONDE_NEW(uint8_t, e->zone_count);
-  e->target = SONDE_NEW(sonde_vec3, e->zone_count);
+  e->imposed = SONDE_NEW(uint8_t, e->zone_count), e->target = SONDE_NEW(sonde_vec3, e->zone_count);
   sonde_vec3 *points = SONDE_NEW(sonde_vec3, e->unknown_count);
   if (all && e->imposed && e->target && points) {
     // Of a grid the lines are what cuts it well: near the probe they lie close together.
@@ -139,7 +138,7 @@ void sonde_equilibrium_destroy(sonde_equilibrium *e) {
   void *parts[] = {e->unknown,   e->zone_node,   e->face,    e->corner, e->moved,
                    e->trial,     e->kept,        e->force,   e->step,   e->way,
                    e->way_trial, e->load,        e->touch,   e->right,  e->schur,
-                   e->matrix,    e->touch_trial, e->imposed, e->target};
+                   e->matrix,    e->touch_trial, e->imposed, e->target, e->front};
   for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
   sonde_surface_index_destroy(e->shape.hull);
   sonde_numeric_clear(&e->numeric);

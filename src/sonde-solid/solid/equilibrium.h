@@ -2,12 +2,14 @@
 #ifndef SONDE_SRC_EQUILIBRIUM_H
 #define SONDE_SRC_EQUILIBRIUM_H
 
+#include "hex.h"
 #include "sparse/multifrontal.h"
 #include "touch.h"
 
 struct sonde_equilibrium {
   const sonde_hexes *mesh;
   sonde_equilibrium_def def;
+  const sonde_hex_kernels *kernels;
   sonde_touch_shape shape;
   sonde_pose start, pose; // where the skin is at rest; where the state is in equilibrium
   // Unknowns: free nodes, those of the patch, then those of the zone, whose skin may touch. The
@@ -25,6 +27,7 @@ struct sonde_equilibrium {
   sonde_vec3 *moved, *trial, *kept; // [node_count] displacements: state, of a line search, before
   double *force, *step;             // [3 unknown_count]
   double *schur, *matrix;           // [side * side], side = 3 zone_count
+  float *front;                     // [side][stride] of the contact's matrix
   double *way, *way_trial, *load, *touch, *right, *touch_trial; // [side]
   double shift;  // of the stiffness, over an element's mean diagonal
   bool factored; // the factor is that of the state or of the last step towards it, without shift

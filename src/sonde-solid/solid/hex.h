@@ -11,24 +11,29 @@ typedef struct sonde_shape_energy {
   double w_pa, first_pa[3], second_pa[3][3];
 } sonde_shape_energy;
 
-// @param stretch2 squares of the principal stretches; ratio their product's root J
-void sonde_hyperelastic_shape(const sonde_hyperelastic *material, const double stretch2[3],
-                              double ratio, sonde_shape_energy *energy);
+// For one instruction set; all give the same bits.
+typedef struct sonde_hex_kernels {
+  const char *name;
+  // Energy (J) of an element whose corners have moved from rest to now, forces f[3 corner + axis]
+  // that hold it there (its gradient, N) and, where k is not NULL, the stiffness (N/m).
+  // @return false: turned inside out at an integration point
+  bool (*evaluate)(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
+                   const sonde_vec3 now[8], double *energy_j, double f[24], double (*k)[24]);
+  // Change of these forces with the exponent; zero for a law without one.
+  bool (*by_exponent)(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
+                      const sonde_vec3 now[8], double f[24]);
+  // @param stretch2 squares of the principal stretches
+  void (*shape)(const sonde_hyperelastic *material, const double stretch2[3],
+                sonde_shape_energy *energy);
+  // Eigenvalues and the columns of eigenvectors of a symmetric matrix.
+  void (*principal)(sonde_mat3 matrix, double value[3], double vector[3][3]);
+} sonde_hex_kernels;
 
-// Change of first_pa with the exponent.
-void sonde_hyperelastic_by_exponent(const sonde_hyperelastic *material, const double stretch2[3],
-                                    double ratio, double by_exponent_pa[3]);
-
-// Eigenvalues and the columns of eigenvectors of a symmetric matrix (Jacobi's rotations).
-void sonde_principal(sonde_mat3 a, double value[3], double vector[3][3]);
-
-// Energy (J) of an element whose corners have moved from rest to now, forces f[3 corner + axis]
-// that hold it there (its gradient, N) and, where k is not NULL, the stiffness (N/m).
-// @return false: turned inside out at an integration point
-bool sonde_hex_evaluate(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
-                        const sonde_vec3 now[8], double *energy_j, double f[24], double (*k)[24]);
-// Change of these forces with the exponent; zero for a law without one.
-bool sonde_hex_by_exponent(const sonde_hyperelastic *material, const sonde_vec3 rest[8],
-                           const sonde_vec3 now[8], double f[24]);
+// The widest that this processor runs, or those called `name`; NULL: none of that name.
+const sonde_hex_kernels *sonde_hex_kernels_find(const char *name);
+extern const sonde_hex_kernels sonde_hex_kernels_base;
+#ifdef __x86_64__
+extern const sonde_hex_kernels sonde_hex_kernels_avx2, sonde_hex_kernels_avx512;
+#endif
 
 #endif

@@ -69,7 +69,8 @@ static sonde_status reserve(sonde_solid_live *l, sonde_error *error) {
       {(void **)&l->rest, side, sizeof *l->rest},
       {(void **)&l->trial, side, sizeof *l->trial},
       {(void **)&l->tangent, side * sonde_front_stride((uint32_t)side), sizeof *l->tangent},
-      {(void **)&l->inverse, zone * zone, sizeof *l->inverse},
+      {(void **)&l->inverse, 2 * zone * sonde_front_stride((uint32_t)(2 * zone)),
+       sizeof *l->inverse},
       {(void **)&l->shown[0].free_m, e->zone_count, sizeof *l->skin},
       {(void **)&l->shown[1].free_m, e->zone_count, sizeof *l->skin},
       {(void **)&l->shown[0].give_m_n, zone * l->width, sizeof(float)},
@@ -85,7 +86,7 @@ static sonde_status reserve(sonde_solid_live *l, sonde_error *error) {
       return sonde_fail_memory(error);
   sonde_status status = SONDE_OK;
   for (int k = 0; k < 2 && !status; ++k)
-    status = sonde_numeric_reserve(&l->bulk[k], e->symbolic, error);
+    l->bulk[k].single = true, status = sonde_numeric_reserve(&l->bulk[k], e->symbolic, error);
   return status;
 }
 

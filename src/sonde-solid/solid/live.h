@@ -55,9 +55,9 @@ struct sonde_solid_live {
   double *ways;                 // [patch side] of this pass
   double *left;                 // [patch side] right-hand side, then ways of a step
   double *right, *rest, *trial; // [patch side]
-  double *tangent;              // [patch side][stride] by columns: eliminated down to the zone
+  float *tangent;               // [patch side][stride] by columns: eliminated down to the zone
   bool ready;                   // `tangent` is that of the state
-  double *inverse;              // [zone side * zone side]
+  float *inverse;               // [2 zone side][stride] front
   sonde_solid_live_counts counts;
 
   // Both: a pass writes tangent[pass & 1].

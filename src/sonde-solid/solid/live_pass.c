@@ -1,13 +1,12 @@
 // A pass: the skin near the probe by Newton's method with the contact inside, on the bulk that is
 // condensed by an older factor; then the bulk follows, and its forces are taken afresh.
-#include "hex.h"
 #include "live.h"
 
 #include "base/base.h"
 
 #include <string.h>
 
-enum { PANEL = 32, HALVINGS = 8, SHIFTS_MOST = 6 };
+enum { HALVINGS = 8, SUMS = 8, SHIFTS_MOST = 6 };
 static const double armijo = 1e-4, first_shift = 1e-3, more_shift = 5;
 static const double tolerance = 1e-4;    // of the skin's residual over the contact's force
 static const double least_load_n = 1e-3; // that residuals are compared with
@@ -105,7 +104,7 @@ static bool condense(sonde_solid_live *l, const sonde_vec3 *u, const double *rig
   const sonde_numeric *bulk = &l->bulk[l->serves];
   double shift = 0;
   for (int n = 0; n < SHIFTS_MOST; ++n, shift = n == 1 ? first_shift : shift * more_shift) {
-    const double *from = sonde_numeric_condensed(bulk);
+    const float *from = sonde_numeric_condensed_single(bulk);
     for (size_t j = 0; j < side; ++j)
       memcpy(l->tangent + j * stride + j, from + j * side + j, (side - j) * sizeof *from);
     for (uint32_t h = 0; h < l->skin_count; ++h) {
@@ -117,24 +116,17 @@ static bool condense(sonde_solid_live *l, const sonde_vec3 *u, const double *rig
           if (corner[i / 3] == SONDE_HELD_CORNER || corner[j / 3] == SONDE_HELD_CORNER) continue;
           const size_t row = 3 * (size_t)(corner[i / 3] - first) + (size_t)(i % 3);
           const size_t column = 3 * (size_t)(corner[j / 3] - first) + (size_t)(j % 3);
-          if (row >= column) l->tangent[column * stride + row] += k[i][j];
+          if (row >= column) l->tangent[column * stride + row] += (float)k[i][j];
         }
     }
-    bool definite = true;
-    for (size_t from_column = 0; from_column < own && definite; from_column += PANEL)
-      definite = bulk->kernels->eliminate(
-          l->tangent, (uint32_t)side, (uint32_t)from_column,
-          (uint32_t)(from_column + PANEL < own ? from_column + PANEL : own));
-    if (!definite) continue;
+    if (!bulk->kernels->eliminate_single(l->tangent, (uint32_t)side, 0, (uint32_t)own)) continue;
     memcpy(l->left, right, side * sizeof *right);
-    for (size_t j = 0; j < own; ++j) {
-      const double *column = l->tangent + j * stride, x = l->left[j] /= column[j];
-      for (size_t i = j + 1; i < side; ++i) l->left[i] -= column[i] * x;
-    }
+    sonde_front_forward(l->tangent, (uint32_t)side, (uint32_t)own, l->left);
     memcpy(e->load, l->left + own, zone * sizeof *e->load);
     for (size_t j = 0; j < zone; ++j)
       for (size_t i = j; i < zone; ++i)
-        e->schur[i * zone + j] = e->schur[j * zone + i] = l->tangent[(own + j) * stride + own + i];
+        e->schur[i * zone + j] = e->schur[j * zone + i] =
+            (double)l->tangent[(own + j) * stride + own + i];
     return true;
   }
   return false;
@@ -161,12 +153,20 @@ static bool search_line(sonde_solid_live *l, sonde_pose pose, patch_standing *s)
   double fall = 0, share = 1;
   for (size_t k = 0; k < side; ++k)
     fall += l->left[k] * (l->right[k] + (k < zone ? 0 : e->touch[k - zone]));
-  const double *column = sonde_numeric_condensed(&l->bulk[l->serves]), *x = l->left;
+  const float *column = sonde_numeric_condensed_single(&l->bulk[l->serves]);
+  const double *x = l->left;
   memset(l->rest, 0, side * sizeof *l->rest);
   for (size_t j = 0; j < side; ++j, column += side) { // of the lower triangle
-    double sum = column[j] * x[j];
-    for (size_t i = j + 1; i < side; ++i) l->rest[i] += column[i] * x[j], sum += column[i] * x[i];
-    l->rest[j] += sum;
+    double sum[SUMS] = {(double)column[j] * x[j]};
+    size_t i = j + 1;
+    for (; i + SUMS <= side; i += SUMS)
+      for (size_t k = 0; k < SUMS; ++k) {
+        const double stiff = (double)column[i + k];
+        l->rest[i + k] += stiff * x[j], sum[k] += stiff * x[i + k];
+      }
+    for (; i < side; ++i)
+      l->rest[i] += (double)column[i] * x[j], sum[0] += (double)column[i] * x[i];
+    for (size_t k = 0; k < SUMS; ++k) l->rest[j] += sum[k];
   }
   for (int half = 0; half < HALVINGS; ++half, share *= 0.5) {
     const double more = half ? -share : 1; // each trial from the last one
@@ -188,7 +188,7 @@ static bool search_line(sonde_solid_live *l, sonde_pose pose, patch_standing *s)
 bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
   sonde_equilibrium *e = l->e;
   const size_t side = sonde_live_side(l), nodes = e->mesh->node_count;
-  const size_t own = side - 3 * (size_t)e->zone_count, stride = sonde_front_stride((uint32_t)side);
+  const size_t own = side - 3 * (size_t)e->zone_count;
   const size_t first = 3 * (size_t)sonde_patch_first(e);
   patch_standing s;
   uint32_t steps = 0;
@@ -209,12 +209,7 @@ bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
     if (!sonde_equilibrium_contact(e, pose, steps == 0)) break;
     // Ways of the patch from those of the zone.
     memcpy(l->left + own, e->way, (side - own) * sizeof *l->left);
-    for (size_t j = own; j-- > 0;) {
-      const double *column = l->tangent + j * stride;
-      double sum = l->left[j];
-      for (size_t i = j + 1; i < side; ++i) sum -= column[i] * l->left[i];
-      l->left[j] = sum / column[j];
-    }
+    sonde_front_backward(l->tangent, (uint32_t)side, (uint32_t)own, l->left);
     (void)sonde_equilibrium_touch(e, pose, e->moved, NULL, false, e->touch, NULL);
     if (!search_line(l, pose, &s)) break;
     ++steps;
@@ -248,14 +243,26 @@ bool sonde_live_show(sonde_solid_live *l, sonde_live_tangent *shown) {
   for (size_t k = 0; k < side; ++k) l->right[k] = l->pull[k] - e->force[first + k];
   l->ready = condense(l, e->moved, l->right);
   if (!l->ready) return false;
-  memcpy(e->matrix, e->schur, zone * zone * sizeof *e->matrix);
-  if (!sonde_cholesky(e->matrix, (uint32_t)zone)) return false;
-  sonde_cholesky_invert(e->matrix, (uint32_t)zone, l->inverse);
-  for (size_t i = 0; i < zone; ++i)
+  // Minus the inverse is what elimination leaves of 0 behind the identity.
+  const size_t own = side - zone, both = 2 * zone, to = sonde_front_stride((uint32_t)both);
+  memset(l->inverse, 0, both * to * sizeof *l->inverse);
+  for (size_t j = 0; j < zone; ++j) {
+    memcpy(l->inverse + j * to + j,
+           l->tangent + (own + j) * sonde_front_stride((uint32_t)side) + own + j,
+           (zone - j) * sizeof *l->inverse);
+    l->inverse[j * to + zone + j] = 1;
+  }
+  const sonde_dense_kernels *kernels = l->bulk[l->serves].kernels;
+  if (!kernels->eliminate_single(l->inverse, (uint32_t)both, 0, (uint32_t)zone)) return false;
+  for (size_t j = 0; j < zone; ++j)
+    for (size_t i = j; i < zone; ++i)
+      shown->give_m_n[i * l->width + j] = shown->give_m_n[j * l->width + i] =
+          -l->inverse[(zone + j) * to + zone + i];
+  for (size_t i = 0; i < zone; ++i) {
+    e->way[i] = 0;
     for (size_t j = 0; j < zone; ++j)
-      shown->give_m_n[i * l->width + j] = (float)l->inverse[i * zone + j];
-  memcpy(e->way, e->load, zone * sizeof *e->way);
-  sonde_cholesky_solve(e->matrix, (uint32_t)zone, e->way);
+      e->way[i] += (double)shown->give_m_n[j * l->width + i] * e->load[j];
+  }
   for (uint32_t k = 0; k < e->zone_count; ++k) {
     const uint32_t node = e->zone_node[k];
     const double *way = e->way + 3 * (size_t)k;

@@ -1,7 +1,6 @@
 // Newton's method in two levels: the solid is linearised and condensed on the skin that may touch;
 // there the contact is solved with all of its nonlinearity; then the energy of both has to fall.
 #include "equilibrium.h"
-#include "hex.h"
 
 #include "base/base.h"
 #include "sparse/dense.h"
@@ -20,9 +19,12 @@ static double norm(const double *x, size_t count) {
 }
 
 static double product(const double *x, const double *y, size_t count) {
-  double sum = 0;
-  for (size_t k = 0; k < count; ++k) sum += x[k] * y[k];
-  return sum;
+  double sum[8] = {0};
+  size_t k = 0;
+  for (; k + 8 <= count; k += 8)
+    for (size_t i = 0; i < 8; ++i) sum[i] += x[k + i] * y[k + i];
+  for (; k < count; ++k) sum[0] += x[k] * y[k];
+  return ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
 }
 
 // ---- the solid ----------------------------------------------------------------------------
@@ -45,7 +47,7 @@ bool sonde_equilibrium_add_forces(const sonde_equilibrium *e, const uint32_t *he
     sonde_vec3 rest[8], now[8];
     double part, f[24];
     const sonde_hyperelastic *material = corners_of(e, u, h, rest, now);
-    if (!sonde_hex_evaluate(material, rest, now, &part, f, NULL)) return false;
+    if (!e->kernels->evaluate(material, rest, now, &part, f, NULL)) return false;
     *energy_j += part;
     for (int k = 0; k < 24; ++k) {
       const uint32_t at = e->corner[h][k / 3];
@@ -62,7 +64,7 @@ void sonde_equilibrium_stiffness(const sonde_equilibrium *e, const sonde_vec3 *u
   sonde_vec3 rest[8], now[8];
   double energy, f[24], trace = 0;
   const sonde_hyperelastic *material = corners_of(e, u, hex, rest, now);
-  bool whole = sonde_hex_evaluate(material, rest, now, &energy, f, k);
+  bool whole = e->kernels->evaluate(material, rest, now, &energy, f, k);
   SONDE_ASSERT(whole); // the state's energy was finite
   for (int i = 0; i < 24; ++i) trace += k[i][i];
   for (int i = 0; i < 24; ++i) k[i][i] += shift * trace / 24;
@@ -148,7 +150,7 @@ static double residual_of(sonde_equilibrium *e, const double *v, const double *t
 }
 
 uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool moving) {
-  const size_t side = 3 * (size_t)e->zone_count;
+  const size_t side = 3 * (size_t)e->zone_count, stride = sonde_front_stride((uint32_t)side);
   // First guess: imposed nodes go to their targets. When the probe has just moved, the skin that it
   // would contain moves with it: left where it is, skin near an edge would be nearer to the probe's
   // side than to its front and leave it there.
@@ -189,10 +191,14 @@ uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool m
         for (size_t j = 0; j < side; ++j) e->matrix[i * side + j] = e->matrix[j * side + i] = 0;
         e->matrix[i * side + i] = 1;
       }
-      definite = sonde_cholesky(e->matrix, (uint32_t)side);
+      // A direction needs single precision; what is left of it, the next one takes.
+      for (size_t j = 0; j < side; ++j)
+        for (size_t i = j; i < side; ++i) e->front[j * stride + i] = (float)e->matrix[j * side + i];
+      definite = e->numeric.kernels->eliminate_single(e->front, (uint32_t)side, 0, (uint32_t)side);
     }
     if (!definite) return 0;
-    sonde_cholesky_solve(e->matrix, (uint32_t)side, e->right);
+    sonde_front_forward(e->front, (uint32_t)side, (uint32_t)side, e->right);
+    sonde_front_backward(e->front, (uint32_t)side, (uint32_t)side, e->right);
     const double fall = product(way, e->right, side), before = energy;
     memcpy(way, e->right, side * sizeof *way);
     for (int half = 0; half < HALVINGS; ++half, share *= 0.5) {
@@ -353,8 +359,8 @@ sonde_status sonde_equilibrium_change(sonde_equilibrium *e, sonde_vec3 way,
     sonde_vec3 rest[8], now[8];
     double energy, f[24], by_exponent[24], shear = 0, exponent = 0;
     const sonde_hyperelastic *material = corners_of(e, e->moved, h, rest, now);
-    const bool whole = sonde_hex_evaluate(material, rest, now, &energy, f, NULL) &&
-                       sonde_hex_by_exponent(material, rest, now, by_exponent);
+    const bool whole = e->kernels->evaluate(material, rest, now, &energy, f, NULL) &&
+                       e->kernels->by_exponent(material, rest, now, by_exponent);
     SONDE_ASSERT(whole); // the state's energy was finite
     for (int k = 0; k < 24; ++k) {
       const uint32_t at = e->corner[h][k / 3];

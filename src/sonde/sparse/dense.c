@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { BLOCK = 16, STRIP = 32 };
+enum { BLOCK = 16, STRIP = 32, SUMS = 8 };
 
 const sonde_dense_kernels *sonde_dense_kernels_find(const char *name) {
   const sonde_dense_kernels *known[] = {
@@ -22,6 +22,29 @@ const sonde_dense_kernels *sonde_dense_kernels_find(const char *name) {
 
 void sonde_multiply(const sonde_product *product) {
   sonde_dense_kernels_find(NULL)->multiply(product);
+}
+
+void sonde_front_forward(const float *front, uint32_t n, uint32_t own, double *x) {
+  SONDE_ASSERT(front != NULL && own <= n);
+  for (size_t j = 0; j < own; ++j) {
+    const float *column = front + j * sonde_front_stride(n);
+    const double y = x[j] /= (double)column[j];
+    for (size_t i = j + 1; i < n; ++i) x[i] -= (double)column[i] * y;
+  }
+}
+
+void sonde_front_backward(const float *front, uint32_t n, uint32_t own, double *x) {
+  SONDE_ASSERT(front != NULL && own <= n);
+  for (size_t j = own; j-- > 0;) {
+    const float *column = front + j * sonde_front_stride(n);
+    double sum[SUMS] = {0};
+    size_t i = j + 1;
+    for (; i + SUMS <= n; i += SUMS)
+      for (size_t k = 0; k < SUMS; ++k) sum[k] += (double)column[i + k] * x[i + k];
+    for (; i < n; ++i) sum[0] += (double)column[i] * x[i];
+    for (size_t k = 1; k < SUMS; ++k) sum[0] += sum[k];
+    x[j] = (x[j] - sum[0]) / (double)column[j];
+  }
 }
 
 static void mirror(double *a, uint32_t n, bool to_upper) {

@@ -29,7 +29,7 @@ static inline uint32_t sonde_front_width(uint32_t own) { return (own + 7) / 8 * 
 
 // Numbers from column to column of a front of order n: zero ones let vectors end behind the last
 // row.
-static inline size_t sonde_front_stride(uint32_t n) { return (size_t)n + 7; }
+static inline size_t sonde_front_stride(uint32_t n) { return (size_t)n + 15; }
 
 // For one instruction set. A front is a lower triangle by columns; what lies above it is nobody's.
 // Its factor of `own`
@@ -41,6 +41,8 @@ typedef struct sonde_dense_kernels {
   // Cholesky of the columns [from, to); what lies behind receives the Schur complement. False at a
   // pivot that is not positive.
   bool (*eliminate)(double *front, uint32_t n, uint32_t from, uint32_t to);
+  // The same in single precision.
+  bool (*eliminate_single)(float *front, uint32_t n, uint32_t from, uint32_t to);
   // x = L11^-1 right, then rest[behind] -= L21 x; right is scratch. Vectors of the width.
   void (*forward)(const float *factor, uint32_t own, uint32_t behind, float *right, float *x,
                   float *rest);
@@ -49,8 +51,13 @@ typedef struct sonde_dense_kernels {
                    const float *rest);
 } sonde_dense_kernels;
 
+// With the first `own` columns of a front of order n that eliminate_single() has eliminated, on
+// x[n], in place: x = L11^-1 x, the rest -= L21 x; then x = L11^-T (x - L21^T rest).
+SONDE_LINK void sonde_front_forward(const float *front, uint32_t n, uint32_t own, double *x);
+SONDE_LINK void sonde_front_backward(const float *front, uint32_t n, uint32_t own, double *x);
+
 // The widest that this processor runs, or those called `name`; NULL: none of that name.
-const sonde_dense_kernels *sonde_dense_kernels_find(const char *name);
+SONDE_LINK const sonde_dense_kernels *sonde_dense_kernels_find(const char *name);
 extern const sonde_dense_kernels sonde_dense_kernels_base;
 #ifdef __x86_64__
 extern const sonde_dense_kernels sonde_dense_kernels_avx2, sonde_dense_kernels_avx512;

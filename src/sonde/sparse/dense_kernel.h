@@ -3,6 +3,7 @@
 #include "base/base.h"
 #include "base/vector.h"
 #include "sparse/dense.h"
+#include "sparse/dense_single.h"
 
 #include <math.h>
 #include <string.h>
@@ -227,4 +228,5 @@ static void backward(const float *factor, uint32_t own, uint32_t behind, float *
   }
 }
 
-const sonde_dense_kernels DENSE_KERNELS = {DENSE_NAME, multiply, eliminate, forward, backward};
+const sonde_dense_kernels DENSE_KERNELS = {DENSE_NAME,       multiply, eliminate,
+                                           eliminate_single, forward,  backward};

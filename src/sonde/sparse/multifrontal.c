@@ -171,14 +171,15 @@ void sonde_symbolic_destroy(sonde_symbolic *s) {
 
 sonde_status sonde_numeric_reserve(sonde_numeric *f, const sonde_symbolic *s, sonde_error *error) {
   SONDE_ASSERT(f != NULL && s != NULL);
+  const size_t number = f->single ? sizeof(float) : sizeof(double);
   const struct {
     void **array;
     size_t *room, wanted, size;
   } parts[] = {
       {(void **)&f->factor, &f->factor_room, s->factor_size, sizeof *f->factor},
       {(void **)&f->front, &f->front_room,
-       s->front_order * sonde_front_stride((uint32_t)s->front_order), sizeof *f->front},
-      {(void **)&f->stack, &f->stack_room, s->stack_size, sizeof *f->stack},
+       s->front_order * sonde_front_stride((uint32_t)s->front_order), number},
+      {(void **)&f->stack, &f->stack_room, s->stack_size, number},
       {(void **)&f->local, &f->local_room, s->node_count, sizeof *f->local},
       {(void **)&f->gathered, &f->gathered_room, s->block * (size_t)s->node_count,
        sizeof *f->gathered},

@@ -3,8 +3,9 @@
 //
 // Nodes are ordered by nested dissection; every piece (a leaf or a separator) owns a dense front.
 // The matrix may be condensed on the nodes that are numbered last: what remains is their stiffness
-// with everything else in equilibrium. Factors are made in double precision and kept in single:
-// what a preconditioner or a displacement needs. All instruction sets give the same bits.
+// with everything else in equilibrium. Factors are made in double precision, or in single twice as
+// fast, and kept in single: what a preconditioner or a displacement needs. All instruction sets
+// give the same bits.
 #ifndef SONDE_SRC_MULTIFRONTAL_H
 #define SONDE_SRC_MULTIFRONTAL_H
 
@@ -62,8 +63,9 @@ typedef struct sonde_numeric {
   sonde_matrix_source source;
   const sonde_dense_kernels *kernels; // the widest; tests choose others
   float *factor;          // per piece, in rows of sonde_front_width(own): see sonde_dense_kernels
-  double *front;          // working front, the condensed matrix at the end
-  double *stack;          // updates that wait for their parent
+  bool single;            // of fronts, set before room is made: double precision or single
+  void *front;            // working front, the condensed matrix at the end; double or float
+  void *stack;            // updates that wait for their parent
   uint32_t *local;        // [node_count] place -> index in the working front
   float *part, *gathered; // unknowns of a piece and its boundary, all unknowns in their order
   size_t factor_room, front_room, stack_room, local_room, gathered_room, part_room;
@@ -89,6 +91,7 @@ SONDE_LINK bool sonde_numeric_factor(sonde_numeric *numeric, const sonde_symboli
 // Condensed stiffness of the last nodes, lower triangle by columns: (i, j) at j*side + i, i >= j,
 // side = block*last_count; until new numbers begin.
 SONDE_LINK const double *sonde_numeric_condensed(const sonde_numeric *numeric);
+SONDE_LINK const float *sonde_numeric_condensed_single(const sonde_numeric *numeric);
 // Each x[k][block*node_count] holds displacements of the last nodes; fills in all others.
 void sonde_numeric_recover(const sonde_numeric *numeric, float *const *x, uint32_t count);
 // Solves in place, to single precision, when no nodes are condensed on.

@@ -44,104 +44,12 @@ uint32_t sonde_symbolic_steps(const sonde_symbolic *s, uint64_t budget) {
   return steps;
 }
 
-// ---- assembly -----------------------------------------------------------------------------
-
-// Adds the update of a child to the lower triangle of the front. Nodes ascend in both.
-INLINE void add_update(double *front, size_t stride, const uint32_t *related, uint32_t count,
-                       const double *update, size_t block) {
-  for (size_t j = 0; j < block * count; ++j, update += block * count) {
-    const size_t node = j / block, axis = j % block;
-    double *column = front + (block * related[node] + axis) * stride;
-    for (size_t b = axis; b < block; ++b)
-      column[block * related[node] + b] += update[block * node + b];
-    for (size_t i = node + 1; i < count; ++i)
-      for (size_t b = 0; b < block; ++b) column[block * related[i] + b] += update[block * i + b];
-  }
-}
-
-// Adds the entries of the pattern in the piece's own rows, whose blocks lie transposed in columns.
-INLINE void add_entries(double *front, size_t stride, const sonde_front_entry *entries,
-                        uint32_t count, const double *value, size_t block) {
-  for (uint32_t k = 0; k < count; ++k) {
-    const sonde_front_entry *e = &entries[k];
-    const double *from = value + e->source * block * block;
-    for (size_t j = 0; j < block; ++j)
-      for (size_t i = e->row == e->column ? j : 0; i < block; ++i)
-        front[(block * e->column + j) * stride + block * e->row + i] += from[block * j + i];
-  }
-}
-
-static void assemble(sonde_numeric *f, const sonde_piece *p) {
-  const sonde_symbolic *s = f->symbolic;
-  const sonde_piece *list = s->pieces.list;
-  size_t n = order_of(s, p), stride = stride_of(f, n);
-  memset(f->front, 0, n * stride * sizeof *f->front);
-  // The matrix.
-  if (s->elements) {
-    for (uint32_t i = 0; i < p->count; ++i) f->local[p->first + i] = i;
-    for (uint32_t i = 0; i < p->boundary_count; ++i)
-      f->local[s->pieces.boundary[p->boundary + i]] = p->count + i;
-    for (uint32_t e = 0; e < p->entry_count; ++e) {
-      // Adds the matrix of one element to the lower triangle.
-      const uint32_t element = s->element_of[p->entry + e];
-      const uint32_t *nodes = f->symbolic->elements[element], *rank = f->symbolic->pieces.rank;
-      double k[24][24];
-      f->source.element(f->source.user, element, k);
-      for (int a = 0; a < 8; ++a) {
-        if (nodes[a] == SONDE_HELD_CORNER) continue;
-        size_t column = 3 * (size_t)f->local[rank[nodes[a]]];
-        for (int b = 0; b < 8; ++b) {
-          if (nodes[b] == SONDE_HELD_CORNER) continue;
-          size_t row = 3 * (size_t)f->local[rank[nodes[b]]];
-          if (row < column) continue;
-          for (size_t i = 0; i < 3; ++i)
-            for (size_t j = 0; j < 3; ++j)
-              f->front[(column + j) * stride + row + i] += k[3 * a + (int)j][3 * b + (int)i];
-        }
-      }
-    }
-  } else if (s->block == 1)
-    add_entries(f->front, stride, s->entries + p->entry, p->entry_count, f->source.value, 1);
-  else
-    add_entries(f->front, stride, s->entries + p->entry, p->entry_count, f->source.value, 3);
-  // What the children left, latest first.
-  for (uint32_t c = 0, at = f->now - 1; c < p->child_count; ++c, at = list[at].before) {
-    size_t order = (size_t)s->block * list[at].boundary_count;
-    const uint32_t *related = s->related + list[at].boundary;
-    f->top -= order * order;
-    if (s->block == 1)
-      add_update(f->front, stride, related, list[at].boundary_count, f->stack + f->top, 1);
-    else
-      add_update(f->front, stride, related, list[at].boundary_count, f->stack + f->top, 3);
-  }
-}
-
 // ---- factorisation ------------------------------------------------------------------------
 
-// The factor of the front to single precision, what lies behind onto the stack.
-static void store(sonde_numeric *f, const sonde_piece *p) {
-  const size_t own = (size_t)f->symbolic->block * p->count, n = order_of(f->symbolic, p);
-  const size_t behind = n - own, width = sonde_front_width((uint32_t)own), stride = stride_of(f, n);
-  float *to = f->factor + p->factor, *l11 = to + behind * width, *inverse = l11 + own * width;
-  memset(l11, 0, (own + 1) * width * sizeof *to);
-  for (size_t j = 0; j < own; ++j) {
-    const double *column = f->front + j * stride;
-    inverse[j] = (float)(1 / column[j]);
-    for (size_t i = j + 1; i < own; ++i) l11[i * width + j] = l11[j * width + i] = (float)column[i];
-  }
-  for (size_t j = 0; j < width; j += 8) // by strips of eight columns
-    for (size_t i = 0; i < behind; ++i) {
-      const double *row = f->front + j * stride + own + i;
-      for (size_t c = 0; c < 8; ++c)
-        to[i * width + j + c] = j + c < own ? (float)row[c * stride] : 0;
-    }
-  double *update = f->stack + f->top;
-  for (size_t j = 0; j < behind; ++j)
-    memcpy(update + j * behind + j, f->front + (own + j) * stride + own + j,
-           (behind - j) * sizeof *update);
-  f->top += behind * behind;
-  SONDE_ASSERT(f->top <= f->stack_room);
-}
+#define NUMBER double
+#include "sparse/multifrontal_front.h"
+#define NUMBER float
+#include "sparse/multifrontal_front.h"
 
 void sonde_numeric_begin(sonde_numeric *f, const sonde_symbolic *symbolic,
                          const sonde_matrix_source *source) {
@@ -161,18 +69,25 @@ bool sonde_numeric_step(sonde_numeric *f, uint64_t budget) {
     const sonde_piece *p = &pieces->list[f->now];
     size_t n = order_of(f->symbolic, p), own = (size_t)f->symbolic->block * p->count;
     if (!f->assembled) {
-      assemble(f, p);
+      if (f->single)
+        assemble_float(f, p);
+      else
+        assemble_double(f, p);
       f->assembled = true, f->column = 0;
       spent += assembly_cost(p, n);
       continue;
     }
     if (f->now == pieces->count) return true; // the condensed matrix stays in the working front
     uint32_t to = f->column + PANEL < own ? f->column + PANEL : (uint32_t)own;
-    f->failed = !f->kernels->eliminate(f->front, (uint32_t)n, f->column, to);
+    f->failed = !(f->single ? f->kernels->eliminate_single(f->front, (uint32_t)n, f->column, to)
+                            : f->kernels->eliminate(f->front, (uint32_t)n, f->column, to));
     spent += panel_cost(n, f->column, to);
     f->column = to;
     if (to < own) continue;
-    store(f, p);
+    if (f->single)
+      store_float(f, p);
+    else
+      store_double(f, p);
     ++f->now, f->assembled = false;
   }
   return f->failed || (f->now == pieces->count && f->assembled);
@@ -187,7 +102,12 @@ bool sonde_numeric_factor(sonde_numeric *f, const sonde_symbolic *symbolic,
 }
 
 const double *sonde_numeric_condensed(const sonde_numeric *f) {
-  SONDE_ASSERT(f->now == f->symbolic->pieces.count && f->assembled);
+  SONDE_ASSERT(f->now == f->symbolic->pieces.count && f->assembled && !f->single);
+  return f->front;
+}
+
+const float *sonde_numeric_condensed_single(const sonde_numeric *f) {
+  SONDE_ASSERT(f->now == f->symbolic->pieces.count && f->assembled && f->single);
   return f->front;
 }
 
