@@ -5,6 +5,7 @@
 #include "echo/kernel_looks.h"
 #include "echo/plane.h"
 #include "echo/psf.h"
+#include "sonde/tissue_anatomy.h"
 
 #include <stdint.h>
 
@@ -149,16 +150,9 @@ typedef struct tissue_cell {
   float section;    // number of the compartment: a septum parts two
 } tissue_cell;
 
-typedef enum tissue_body_kind {
-  TISSUE_NERVE,
-  TISSUE_TENDON,
-  TISSUE_LYMPH,
-  TISSUE_CUSPS
-} tissue_body_kind;
-
 // A nerve, tendon or lymph node of a tissue map, or a valve's cusps.
 typedef struct tissue_body {
-  tissue_body_kind kind;
+  sonde_tissue kind;
   float half_m[3]; // semi-axes; along a cord 1
   float facing;    // how squarely the beam meets its fibres, 0..1
 } tissue_body;

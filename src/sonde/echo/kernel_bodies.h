@@ -78,7 +78,7 @@ INLINE void bodies(const tissue_job *job, const tissue_point *p, const float *fi
   for (uint32_t k = 0; k < job->bodies; ++k, field += BODY_FIELDS * n) {
     const tissue_body *it = &job->body[k];
     floats q[3] = {vload(field), vload(field + n), vload(field + 2 * n)};
-    if (it->kind == TISSUE_LYMPH) {
+    if (it->kind == SONDE_TISSUE_NODE) {
       const tissue_lesion node = {
           TISSUE_NODE, {1 / it->half_m[0], 1 / it->half_m[1], 1 / it->half_m[2]}, node_rim};
       lesion(&node, p->memory, q, lesion_distance(&node, q), p->theta, p->s, p->depth, out);
@@ -86,9 +86,9 @@ INLINE void bodies(const tissue_job *job, const tissue_point *p, const float *fi
     }
     floats square = q[0] * q[0] + q[1] * q[1];
     ints in = square < 1;
-    if (it->kind == TISSUE_CUSPS || !vany(in)) continue;
+    if (it->kind == SONDE_TISSUE_CUSPS || !vany(in)) continue;
     const float square_on = it->facing * it->facing, fourth = square_on * square_on;
-    if (it->kind == TISSUE_NERVE) {
+    if (it->kind == SONDE_TISSUE_NERVE) {
       // A honeycomb: three waves across the nerve at 60 degrees, which sway along it.
       floats sway = texture(p->memory, p->theta, p->s * 60, p->depth * 150, TURNS_FAT, 6);
       floats u = q[0] * (1e3f * it->half_m[0] / fascicle_mm) + 0.5f * sway, c[3], s;

@@ -76,7 +76,7 @@ INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const 
   for (uint32_t v = 2; v < job->vessels; ++v)
     mark(level[v] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
   for (uint32_t k = 0; k < job->bodies; ++k, body += BODY_FIELDS * n)
-    if (job->body[k].kind == TISSUE_CUSPS) {
+    if (job->body[k].kind == SONDE_TISSUE_CUSPS) {
       const floats bright = cusps(&job->body[k], body, n);
       for (uint32_t v = 0; v < job->vessels && vany(bright > 0); ++v)
         mark((level[v] <= 0) & (bright > out[0]), bright, blood_tissue[1], out);

@@ -257,10 +257,7 @@ static void describe_map(const sonde_echo *echo, tissue_job *job) {
   for (uint32_t k = 0; k < job->bodies; ++k) {
     const sonde_map_body body = map->body(map->self, echo->body[k], look);
     const double along = v_dot(body.axis, beam), length = body.half_m.z > 0 ? body.half_m.z : 1;
-    job->body[k] = (tissue_body){body.tissue == SONDE_TISSUE_NERVE    ? TISSUE_NERVE
-                                 : body.tissue == SONDE_TISSUE_TENDON ? TISSUE_TENDON
-                                 : body.tissue == SONDE_TISSUE_CUSPS  ? TISSUE_CUSPS
-                                                                      : TISSUE_LYMPH,
+    job->body[k] = (tissue_body){body.tissue,
                                  {(float)body.half_m.x, (float)body.half_m.y, (float)length},
                                  (float)sqrt(fmax(1 - along * along, 0))};
   }
