@@ -31,9 +31,11 @@ static const app_option TABLE[] = {
     OPT_TEXT(what.frames, "frames", "DIR", "a PNG per image, named by its tick"),
     OPT_TEXT(what.video, "video", "FILE.mp4",
              "a film of 25 pictures per second; needs the program ffmpeg (Debian package ffmpeg)"),
-    OPT_TEXT(what.sequence, "sequence", "FILE",
-             "a tracked sequence for PLUS, 3D Slicer and sonde slice: the images with the probe's "
-             "pose, time, force and area ratios; .igs.mha, .igs.nrrd or .seq.nrrd"),
+    OPT_TEXT(
+        what.sequence, "sequence", "FILE",
+        "a tracked sequence for PLUS, 3D Slicer and sonde slice: the images with the probe's "
+        "pose, time, force and area ratios; .igs.mha, .igs.nrrd or .seq.nrrd; .dcm: ultrasound "
+        "multi-frame of DICOM, with one depth"),
     OPT_REAL(what.from_s, "from", "S", 0, 1e6, 1, "begin of the part to export, in seconds"),
     OPT_REAL(what.to_s, "to", "S", 0, 1e6, 1, "end of the part to export, in seconds"),
     OPT_FLAG(

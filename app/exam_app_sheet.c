@@ -3,6 +3,7 @@
 #include "exam_app_parts.h"
 
 #include <assert.h>
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -158,8 +159,20 @@ sonde_status exam_sheet_save(const exam *of, sonde_error *error) {
   if (!of->sheet.written) return SONDE_OK;
   for (uint32_t k = 0; k < of->sheet.picture_count; ++k) {
     const sonde_sheet_picture *picture = &of->sheet.picture[k];
-    if (access(picture_path(of, picture, path), F_OK) == 0) continue;
-    sonde_status status = sonde_image_save_png(&picture->image, path, error);
+    sonde_status status = SONDE_OK;
+    if (access(picture_path(of, picture, path), F_OK) != 0)
+      status = sonde_image_save_png(&picture->image, path, error);
+    // For an archive, as secondary capture; it belongs to the study of the exam.
+    const sonde_dicom_about about = {.study = of->id,
+                                     .patient_id = of->id,
+                                     .date = of->date,
+                                     .title = "Worksheet",
+                                     .side = (char)toupper((unsigned char)of->sheet.side[0]),
+                                     .series = 2,
+                                     .number = picture->number};
+    memcpy(strrchr(path, '.'), ".dcm", 4);
+    if (!status && picture->image.pixels && access(path, F_OK) != 0)
+      status = sonde_image_save_dicom(path, &picture->image, &about, error);
     if (status) return status;
   }
   sonde_status status = sonde_worksheet_save_csv(

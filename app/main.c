@@ -11,9 +11,9 @@
 static const app_command *const COMMANDS[] = {
     &cmd_run,      &cmd_fit,         &cmd_generate, &cmd_limb,   &cmd_predict, &cmd_measure,
     &cmd_identify, &cmd_press,       &cmd_solve,    &cmd_image,  &cmd_doppler, &cmd_cut,
-    &cmd_simulate, &cmd_reconstruct, &cmd_slice,    &cmd_replay, &cmd_dataset, &cmd_bench,
-    &cmd_exam,     &cmd_class,       &cmd_cases,    &cmd_course, &cmd_scanner, &cmd_validate,
-    &cmd_paper,    &cmd_devices};
+    &cmd_simulate, &cmd_reconstruct, &cmd_slice,    &cmd_replay, &cmd_send,    &cmd_dataset,
+    &cmd_bench,    &cmd_exam,        &cmd_class,    &cmd_cases,  &cmd_course,  &cmd_scanner,
+    &cmd_validate, &cmd_paper,       &cmd_devices};
 
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof COMMANDS[0], WORD_MAX = 16 };
 

@@ -1,5 +1,6 @@
 // Exports of an exam: a table as CSV or JSON, a PNG per image, a film.
 #include "replay_export.h"
+#include "exam_app_parts.h"
 
 #include <assert.h>
 #include <math.h>
@@ -224,6 +225,23 @@ static sonde_status play(output *o, const sonde_progress *progress, sonde_error 
   return status;
 }
 
+// A DICOM file belongs to the study of its exam, whose number and date the recording's setup tells.
+static sonde_status save_sequence(const replay_export *what, const sonde_sequence *sequence,
+                                  sonde_error *error) {
+  const size_t length = strlen(what->sequence);
+  if (length < 4 || strcmp(what->sequence + length - 4, ".dcm") != 0)
+    return sonde_sequence_save(what->sequence, sequence, true, error);
+  sonde_json *setup = exam_read_setup(what->recording);
+  const char *id = sonde_json_as_text(sonde_json_member(setup, "exam"));
+  const sonde_dicom_about about = {.study = id,
+                                   .patient_id = id,
+                                   .date = sonde_json_as_text(sonde_json_member(setup, "date")),
+                                   .title = "Compression ultrasound"};
+  sonde_status status = sonde_sequence_save_dicom(what->sequence, sequence, &about, error);
+  sonde_json_free(setup);
+  return status;
+}
+
 sonde_status replay_export_run(sonde_player *player, replay_export *what,
                                const sonde_progress *progress, sonde_error *error) {
   assert(what->from_s <= what->to_s);
@@ -270,7 +288,7 @@ sonde_status replay_export_run(sonde_player *player, replay_export *what,
   if (what->sequence && keep && !first) {
     const uint32_t made = o.sequence.count;
     o.sequence.count = what->tracked;
-    first = sonde_sequence_save(what->sequence, &o.sequence, true, &own);
+    first = save_sequence(what, &o.sequence, &own);
     o.sequence.count = made;
   }
   sonde_sequence_clear(&o.sequence);

@@ -28,6 +28,7 @@
 #include "sonde/echo.h"
 #include "sonde/echo_scanner.h"
 #include "sonde/echo_validate.h"
+#include "sonde/sweep_dicom.h"
 #include "sonde/sweep_frames.h"
 #include "sonde/sweep_strain.h"
 #include "sonde/sweep_truth.h"

@@ -71,8 +71,8 @@ SONDE_API sonde_status sonde_sequence_set_transform(sonde_sequence *sequence, ui
 SONDE_API sonde_status sonde_sequence_load(const char *path, sonde_sequence *sequence,
                                            sonde_error *error);
 /**
- * Writes by the name's end: .mha, .seq.nrrd (four axes, as Slicer wants) or .nrrd (three, as IGSIO
- * writes). Equal sequences give equal bytes. @thread owner
+ * Writes by the name's end: .mha, .seq.nrrd (four axes, as Slicer wants), .nrrd (three, as IGSIO
+ * writes) or .dcm (sonde_sequence_save_dicom()). Equal sequences give equal bytes. @thread owner
  */
 SONDE_API sonde_status sonde_sequence_save(const char *path, const sonde_sequence *sequence,
                                            bool compressed, sonde_error *error);

@@ -127,6 +127,19 @@ static int teach(exam_app *app) {
   }
   printf("practises: %s, repetition %u, %s, film %s\n", app->exam->protocol->id,
          app->exam->turn + 1, app->exam->guidance, app->film ? "goes on" : "is over");
+  // A picture of the worksheet.
+  uint64_t tick = 0;
+  for (int k = 0; k < 20000 && !tick; ++k) {
+    turn_for(app, 0);
+    pthread_mutex_lock(&app->lock);
+    tick = app->exam->seen_tick;
+    pthread_mutex_unlock(&app->lock);
+  }
+  char entry[100];
+  snprintf(entry, sizeof entry, "{\"type\":\"worksheet\",\"picture\":%llu,\"place\":0}",
+           (unsigned long long)tick);
+  sonde_status stored = exam_app_write_sheet(app, entry, &error);
+  printf("stores a picture: %s\n", stored ? error.message : "yes");
   exam_finish(app, &error);
   return APP_OK;
 }

@@ -50,4 +50,14 @@ said 'words: The walls touch at [0-9]+ N: there is no clot'
 said 'words: Let go'
 said 'words: That was all\. The note of the case\.'
 said 'practises: lesson-a, repetition 3, exam, film is over'
+said 'stores a picture: yes'
+# It is there for an archive too: secondary capture of 1/2 of the session's 128 x 128 pixels.
+checks=$((checks + 1))
+picture=$(echo exams/*/worksheet-1.dcm)
+[[ -e $picture && $(tail -c 4096 "$picture" | wc -c) == 4096 ]] || wrong "no DICOM file of the picture"
+grep -aq '1\.2\.840\.10008\.5\.1\.4\.1\.1\.7' "$picture" || wrong "$picture is no secondary capture"
+if command -v dciodvfy >/dev/null; then
+  dciodvfy "$picture" >"$out" 2>&1 || true
+  { grep -q '^SCImage' "$out" && ! grep -q '^Error' "$out"; } || wrong "dciodvfy: $(<"$out")"
+fi
 finish

@@ -18,6 +18,7 @@ declare -A options=(
   [reconstruct]="-o --leave-one-out --copy --config --json"
   [slice]="--pose --frame --hold-out -o --compare --stack --json"
   [replay]="--json"
+  [send]="--to --called --calling --json"
   [bench]="--scene --haptics --device --json"
   [validate]="--quick --pressing --sites --json"
   [exam]="--case --protocol --operator --seed --compare -o --json"

@@ -236,35 +236,6 @@ static void join(sonde_igtl_server *server, client *c) {
   ++server->counts.joined;
 }
 
-static void admit(sonde_igtl_server *server) {
-  for (;;) {
-    int socket = accept4(server->listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK), k = 0;
-    if (socket < 0) return;
-    while (k < PUSHED && server->client[k].socket >= 0) ++k;
-    if (k < PUSHED) {
-      server->client[k].socket = socket;
-      join(server, &server->client[k]);
-    } else {
-      close(socket);
-    }
-  }
-}
-
-// Reaches for the reader that is pushed to, once a second.
-static void reach(sonde_igtl_server *server) {
-  client *c = &server->client[PUSHED];
-  const double now_s = sonde_clock_now();
-  if (!server->pushes || c->socket >= 0 || now_s < server->push_s) return;
-  server->push_s = now_s + AGAIN_S;
-  c->socket = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (c->socket < 0) return;
-  c->connecting = true;
-  if (!connect(c->socket, (struct sockaddr *)&server->push, sizeof server->push))
-    join(server, c);
-  else if (errno != EINPROGRESS)
-    drop(server, c);
-}
-
 static void attend(sonde_igtl_server *server, client *c, int events) {
   if (c->connecting && events) {
     int problem = 0;
@@ -286,7 +257,20 @@ static void *run(void *argument) {
   struct pollfd list[CLIENTS + 2];
   pthread_mutex_lock(&server->lock);
   while (!server->stopping) {
-    reach(server);
+    // Reaches for the reader that is pushed to, once a second.
+    client *reader = &server->client[PUSHED];
+    const double now_s = sonde_clock_now();
+    if (server->pushes && reader->socket < 0 && now_s >= server->push_s) {
+      server->push_s = now_s + AGAIN_S;
+      reader->socket = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+      reader->connecting = reader->socket >= 0;
+      if (reader->connecting) {
+        if (!connect(reader->socket, (struct sockaddr *)&server->push, sizeof server->push))
+          join(server, reader);
+        else if (errno != EINPROGRESS)
+          drop(server, reader);
+      }
+    }
     for (int i = 0; i < CLIENTS; ++i) {
       const client *c = &server->client[i];
       const bool writes = c->socket >= 0 && (c->connecting || busy(c));
@@ -301,7 +285,17 @@ static void *run(void *argument) {
     pthread_mutex_lock(&server->lock);
     for (int i = 0; i < CLIENTS; ++i)
       if (server->client[i].socket >= 0) attend(server, &server->client[i], list[i].revents);
-    if (list[CLIENTS].revents) admit(server);
+    for (int socket = list[CLIENTS].revents ? 0 : -1; socket >= 0;) {
+      socket = accept4(server->listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+      int k = 0;
+      while (k < PUSHED && server->client[k].socket >= 0) ++k;
+      if (socket >= 0 && k < PUSHED) {
+        server->client[k].socket = socket;
+        join(server, &server->client[k]);
+      } else if (socket >= 0) {
+        close(socket);
+      }
+    }
   }
   pthread_mutex_unlock(&server->lock);
   return NULL;

@@ -1,5 +1,6 @@
 // Sequences in memory and their files.
 #include "sweep/frames.h"
+#include "sonde/sweep_dicom.h"
 
 #include <string.h>
 
@@ -240,6 +241,7 @@ sonde_status sonde_sequence_load(const char *path, sonde_sequence *s, sonde_erro
 sonde_status sonde_sequence_save(const char *path, const sonde_sequence *s, bool compressed,
                                  sonde_error *error) {
   SONDE_ASSERT(path != NULL && s != NULL && s->frames != NULL);
+  if (sonde_text_ends(path, ".dcm")) return sonde_sequence_save_dicom(path, s, NULL, error);
   size_t count = pixel_count(s);
   uint8_t *turned = SONDE_NEW(uint8_t, count);
   if (!turned) return sonde_fail_memory(error);

@@ -237,8 +237,8 @@ sonde_status sonde_pixels_save(const char *path, const sonde_sequence *s, const 
   SONDE_ASSERT((s == NULL) != (v == NULL));
   bool mha = sonde_text_ends(path, ".mha");
   if (!mha && !sonde_text_ends(path, ".nrrd"))
-    return sonde_fail(error, SONDE_ARGUMENT, "%.200s: expected a name that ends in .mha or .nrrd",
-                      path);
+    return sonde_fail(error, SONDE_ARGUMENT, "%.200s: expected a name that ends in %s", path,
+                      s ? ".mha, .nrrd or .dcm" : ".mha or .nrrd");
   uint8_t *packed = NULL;
   sonde_file *file = NULL;
   sonde_status status = SONDE_OK;
