@@ -46,7 +46,7 @@ for (const state of ["complete", "open", "too_hard", "off_axis"])
 
 // ---- words
 
-const ENGINEER = /calculix|\.csv\b|finite.element|bonded|footprint|penetration|skin nodes|dimensionless|popliteal vein|\bas fitted\b|fitted values/i;
+const ENGINEER = /calculix|\.csv\b|finite.element|bonded|footprint|penetration|skin nodes|dimensionless|\bas fitted\b|fitted values/i;
 const quoted = (text) => [...text.matchAll(/"((?:[^"\\\n]|\\.)*)"|`((?:[^`\\]|\\.)*)`|'((?:[^'\\\n]|\\.)*)'/g)].map((m) => m[1] ?? m[2] ?? m[3]);
 const plain = (text) => text.split("\n").filter((l) => !/^\s*(\/\/|\*|\/\*)/.test(l)).join("\n");
 const files = (folder, end) => readdirSync(join(source, folder)).filter((f) => f.endsWith(end)).map((f) => [`${folder}/${f}`, readFileSync(join(source, folder, f), "utf8")]);

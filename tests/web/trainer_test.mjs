@@ -38,7 +38,14 @@ async function inspect(page, state) {
 
 async function testStart(page) {
   check(await page.locator("#start").isVisible(), "a new visit asks what to do");
-  check((await page.locator(".cards.case .card").count()) >= 12, "every case is offered");
+  const offered = await page.locator(".cards.case .card").count();
+  check(offered >= 12, "every case is offered");
+  await page.locator("#tab-hard").click();
+  const hard = await page.locator(".cards.case .card .level").allTextContents();
+  check(hard.length > 0 && hard.length < offered && hard.every((text) => text === "Hard"), "only the cases of one level when asked");
+  check((await page.locator(".cards.case input:checked").count()) === 1, "one of them is chosen");
+  await page.locator("#tab-all").click();
+  await page.locator(".cards.case .card").first().click();
   await inspect(page, "start");
 }
 

@@ -30,11 +30,26 @@ function cards(name: string, legend: string, list: Choice[], chosen: string, cha
   return box;
 }
 
+/** Buttons of which one is pressed. */
+function chips(label: string, choices: { id: string; title: string }[], chosen: string, change: (id: string) => void): HTMLElement {
+  const box = make("div", "chips");
+  box.setAttribute("role", "group");
+  box.setAttribute("aria-label", label);
+  for (const c of choices) {
+    const chip = button(c.title, () => change(c.id));
+    chip.id = `tab-${c.id || "all"}`;
+    chip.setAttribute("aria-pressed", String(c.id === chosen));
+    box.append(chip);
+  }
+  return box;
+}
+
 export class StartDialog {
   private hello: Hello | null = null;
   private wish: ExamWish = { case: "", protocol: "", guidance: "full", trainee: "" };
   private readonly box = find<HTMLDialogElement>("start");
   private taught = true; // the course is in view
+  private level = ""; // of the cases in view; empty: all
   readonly course: CourseView;
 
   constructor(
@@ -84,7 +99,7 @@ export class StartDialog {
 
   open(caseId?: string): void {
     if (!this.hello?.trainer || this.box.open) return;
-    if (caseId) this.wish.case = caseId;
+    if (caseId) this.wish.case = caseId, this.level = "";
     this.taught = this.course.any && !caseId && recall("start") !== "exams";
     this.build(this.hello);
     this.box.showModal();
@@ -128,26 +143,25 @@ export class StartDialog {
     head.id = "start-title";
     row.append(head);
     if (!this.course.any) return row;
-    const tabs = make("div", "chips");
-    tabs.setAttribute("role", "group");
-    tabs.setAttribute("aria-label", "Course or single exams");
-    for (const [id, text, taught] of [["tab-course", "Course", true], ["tab-exams", "Single exams", false]] as const) {
-      const tab = button(text, () => {
-        this.taught = taught;
-        remember("start", taught ? "course" : "exams");
-        if (this.hello) this.build(this.hello);
-      });
-      tab.id = id;
-      tab.setAttribute("aria-pressed", String(taught === this.taught));
-      tabs.append(tab);
-    }
-    row.append(tabs);
+    const views = [{ id: "course", title: "Course" }, { id: "exams", title: "Single exams" }];
+    row.append(chips("Course or single exams", views, this.taught ? "course" : "exams", (view) => {
+      this.taught = view === "course";
+      remember("start", view);
+      if (this.hello) this.build(this.hello);
+    }));
     return row;
   }
 
   private exams(hello: Hello): void {
     const intro = recall("trained") ? "Choose a case, or practise freely." : "New here? Press Start: the page leads you through a first exam.";
-    const cases = (hello.case_list ?? []).map((c: CaseInfo) => ({ id: c.id, title: c.title, text: c.history, tag: LEVELS[c.level] }));
+    const all = hello.case_list ?? [];
+    const levels = [...new Set(all.map((c: CaseInfo) => c.level))];
+    const seen = all.filter((c) => !this.level || c.level === this.level);
+    const cases = seen.map((c: CaseInfo) => ({ id: c.id, title: c.title, text: c.history, tag: LEVELS[c.level] }));
+    const row = make("div", "start-head");
+    const choices = [{ id: "", title: `All ${all.length} cases` }, ...levels.map((id) => ({ id: id as string, title: LEVELS[id] }))];
+    row.append(make("p", "intro", intro));
+    if (levels.length > 1) row.append(chips("Cases of which level", choices, this.level, (level) => this.choose(level, hello)));
     const left = cards("case", "Case", cases, this.wish.case, (id) => (this.wish.case = id));
     const right = make("div", "options");
     const guidance = (Object.keys(GUIDANCE) as Guidance[]).map((id) => ({ id, title: GUIDANCE[id][0], text: GUIDANCE[id][1] }));
@@ -158,7 +172,15 @@ export class StartDialog {
     );
     const columns = make("div", "columns");
     columns.append(left, right);
-    this.box.replaceChildren(this.head(), make("p", "intro", intro), columns, this.foot());
+    this.box.replaceChildren(this.head(), row, columns, this.foot());
+  }
+
+  /** Shows the cases of one level; one of them is chosen. */
+  private choose(level: string, hello: Hello): void {
+    this.level = level;
+    const seen = (hello.case_list ?? []).filter((c) => !level || c.level === level);
+    if (!seen.some((c) => c.id === this.wish.case)) this.wish.case = seen[0]?.id ?? "";
+    this.build(hello);
   }
 
   private name(): HTMLElement {
