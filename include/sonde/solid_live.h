@@ -31,6 +31,8 @@ typedef struct sonde_solid_live_def {
   double refresh_m;   /**< way of the probe after which the bulk is factored anew; 2.5 mm */
   double pass_m;      /**< the state follows the probe by at most this in a pass; 3 mm */
   double lag_m;       /**< and stays at most this far from where the bulk was factored; 6 mm */
+  double ease_n_s;    /**< what a new pass changes in the force at one pose reaches the hand at most
+                           so fast; 5 N/s */
 } sonde_solid_live_def;
 SONDE_API sonde_solid_live_def sonde_solid_live_def_default(void); /**< @thread any */
 

@@ -18,7 +18,8 @@ sonde_solid_live_def sonde_solid_live_def_default(void) {
                                 .lead_passes = 1.5,
                                 .refresh_m = 2.5e-3,
                                 .pass_m = 3e-3,
-                                .lag_m = 6e-3};
+                                .lag_m = 6e-3,
+                                .ease_n_s = 5};
 }
 
 // Bulk, then nonlinear skin: hexahedra of the skin all of whose corners are in the patch or zone.
@@ -108,7 +109,8 @@ sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe 
       {"pass_ticks", def->pass_ticks, 1, 1000}, {"factor_passes", def->factor_passes, 1, 100},
       {"skin_steps", def->skin_steps, 1, 20},   {"skin_m", def->skin_m, 1e-3, 0.2},
       {"lead_passes", def->lead_passes, 0, 5},  {"refresh_m", def->refresh_m, 1e-5, 0.05},
-      {"pass_m", def->pass_m, 1e-5, 0.05},      {"lag_m", def->lag_m, def->refresh_m, 0.1}};
+      {"pass_m", def->pass_m, 1e-5, 0.05},      {"lag_m", def->lag_m, def->refresh_m, 0.1},
+      {"ease_n_s", def->ease_n_s, 1e-3, 1e9}};
   if (!status) status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
   if (!status && def->solid.bonded)
     status = sonde_fail(error, SONDE_ARGUMENT, "bonded: expected a probe that slides");
@@ -119,7 +121,7 @@ sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe 
   status = sonde_equilibrium_place(mesh, probe, start, &def->solid, def->skin_m, &l->e, error);
   if (!status) status = reserve(l, error);
   if (!status) {
-    l->before = start;
+    l->before = l->felt_pose = start;
     arrange(l);
     // As many multiplications per pass as let the passes make a factor.
     l->slice = 1000000;
@@ -200,6 +202,7 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
     memcpy(next->free_m, last->free_m, e->zone_count * sizeof *next->free_m);
     memcpy(next->give_m_n, last->give_m_n,
            3 * (size_t)e->zone_count * l->width * sizeof *next->give_m_n);
+    next->stiffness_n_m = last->stiffness_n_m;
   }
   // A state that finds no way on goes back to rest, from where it follows the probe again.
   l->counts.kept += !found;

@@ -10,8 +10,9 @@
 
 // The solid as the tick sees it: where the zone's skin would be without a probe, and how it gives.
 typedef struct sonde_live_tangent {
-  sonde_vec3 *free_m; // [zone_count] places
-  float *give_m_n;    // [side][width] displacements of the zone's nodes for a force on one
+  sonde_vec3 *free_m;   // [zone_count] places
+  float *give_m_n;      // [side][width] displacements of the zone's nodes for a force on one
+  double stiffness_n_m; // of all of the zone held to the probe
 } sonde_live_tangent;
 
 // A point of the contact's quadrature.
@@ -74,6 +75,9 @@ struct sonde_solid_live {
   float *rows;                     // [point_count][width]
   float *moved;                    // [width] displacements of the zone's nodes under the loads
   sonde_vec3 *skin;                // [zone_count] places of the last tick
+  sonde_vec3 felt_n, felt_nm;      // by the hand in the last tick
+  sonde_pose felt_pose;            // and where
+  sonde_vec3 easing_n, easing_nm;  // of it what the contact does not exert
 };
 
 static inline size_t sonde_live_side(const sonde_solid_live *l) { // of patch and zone

@@ -10,7 +10,8 @@
 enum { SWEEPS_MOST = 60 };
 static const double margin_m = 1e-3; // points this far from the probe may come to bear
 static const float relax = 1.3F, fine = 1e-3F;
-static const float least_n = 1e-6F; // change of all loads that does not count
+static const double easing_s = 0.15; // in which what is eased out falls to 1/e, at the latest
+static const float least_n = 1e-6F;  // change of all loads that does not count
 
 // Points that lie in the probe or near it, with the depth that they would have without any force.
 static uint32_t find_candidates(sonde_solid_live *l, sonde_pose pose) {
@@ -101,18 +102,10 @@ static uint32_t solve(sonde_solid_live *l, uint32_t count) {
   return sweeps;
 }
 
-void sonde_solid_live_tick(sonde_solid_live *l, sonde_pose pose, sonde_solid_contact *contact) {
-  SONDE_ASSERT(l != NULL && contact != NULL);
+// The contact at a pose on the tangent that serves; the skin's places go with it.
+// @return whether any skin may bear a force
+static bool touch(sonde_solid_live *l, sonde_pose pose, sonde_solid_contact *contact) {
   *contact = (sonde_solid_contact){0};
-  if (l->ticks++ % l->def.pass_ticks == 0) { // takes over the pass that is due, asks for the next
-    const uint32_t asked = atomic_load_explicit(&l->asked, memory_order_relaxed);
-    if (atomic_load_explicit(&l->done, memory_order_acquire) == asked) {
-      l->serving = asked & 1, l->asked_pose = pose;
-      atomic_store_explicit(&l->asked, asked + 1, memory_order_release);
-    } else {
-      ++l->late;
-    }
-  }
   const uint32_t count = find_candidates(l, pose);
   contact->sweeps = solve(l, count);
   for (uint32_t n = 0; n < count; ++n) {
@@ -128,4 +121,47 @@ void sonde_solid_live_tick(sonde_solid_live *l, sonde_pose pose, sonde_solid_con
     const float *x = l->moved + 3 * (size_t)k;
     l->skin[k] = v_add(free_m[k], vec3((double)x[0], (double)x[1], (double)x[2]));
   }
+  return count > 0;
+}
+
+// What the hand feels: the contact and what is still to be eased out. The force changes no faster
+// than the whole skin held to the probe would make it, and the easing.
+static void ease(sonde_solid_live *l, sonde_pose pose, bool touches, sonde_solid_contact *contact) {
+  const double size = v_norm(l->easing_n), most = 1e-3 * l->def.ease_n_s;
+  const double left = fmin(size - most - 1e-3 * size / easing_s, v_norm(contact->force_n));
+  const double share = left > 0 ? left / size : 0;
+  sonde_vec3 force = v_madd(contact->force_n, share, l->easing_n);
+  sonde_vec3 torque = v_madd(contact->torque_nm, share, l->easing_nm);
+  const double way = sonde_equilibrium_way(l->felt_pose, pose);
+  const double change = v_distance(force, l->felt_n);
+  const double limit = most + l->shown[l->serving].stiffness_n_m * way;
+  if (!touches) {
+    force = torque = vec3(0, 0, 0);
+  } else if (change > limit) {
+    force = v_madd(l->felt_n, limit / change, v_sub(force, l->felt_n));
+    torque = v_madd(l->felt_nm, limit / change, v_sub(torque, l->felt_nm));
+  }
+  l->easing_n = v_sub(force, contact->force_n), l->easing_nm = v_sub(torque, contact->torque_nm);
+  contact->force_n = l->felt_n = force, contact->torque_nm = l->felt_nm = torque;
+  l->felt_pose = pose;
+}
+
+void sonde_solid_live_tick(sonde_solid_live *l, sonde_pose pose, sonde_solid_contact *contact) {
+  SONDE_ASSERT(l != NULL && contact != NULL);
+  if (l->ticks++ % l->def.pass_ticks == 0) { // takes over the pass that is due, asks for the next
+    const uint32_t asked = atomic_load_explicit(&l->asked, memory_order_relaxed);
+    if (atomic_load_explicit(&l->done, memory_order_acquire) == asked) {
+      // What the hand would feel on the last tangent at this pose, less what it will feel.
+      sonde_solid_contact last, next;
+      (void)touch(l, pose, &last);
+      l->serving = asked & 1, l->asked_pose = pose;
+      atomic_store_explicit(&l->asked, asked + 1, memory_order_release);
+      (void)touch(l, pose, &next);
+      l->easing_n = v_add(l->easing_n, v_sub(last.force_n, next.force_n));
+      l->easing_nm = v_add(l->easing_nm, v_sub(last.torque_nm, next.torque_nm));
+    } else {
+      ++l->late;
+    }
+  }
+  ease(l, pose, touch(l, pose, contact), contact);
 }

@@ -237,9 +237,9 @@ bool sonde_live_show(sonde_solid_live *l, sonde_live_tangent *shown) {
   const size_t first = 3 * (size_t)sonde_patch_first(e);
   double energy = 0;
   memset(e->force + first, 0, side * sizeof *e->force);
-  const bool whole = sonde_equilibrium_add_forces(e, l->hex + l->bulk_count, l->skin_count,
-                                                  e->moved, &energy, e->force);
-  SONDE_ASSERT(whole); // the state is one that a pass has accepted
+  const bool upright = sonde_equilibrium_add_forces(e, l->hex + l->bulk_count, l->skin_count,
+                                                    e->moved, &energy, e->force);
+  SONDE_ASSERT(upright); // the state is one that a pass has accepted
   for (size_t k = 0; k < side; ++k) l->right[k] = l->pull[k] - e->force[first + k];
   l->ready = condense(l, e->moved, l->right);
   if (!l->ready) return false;
@@ -258,11 +258,15 @@ bool sonde_live_show(sonde_solid_live *l, sonde_live_tangent *shown) {
     for (size_t i = j; i < zone; ++i)
       shown->give_m_n[i * l->width + j] = shown->give_m_n[j * l->width + i] =
           -l->inverse[(zone + j) * to + zone + i];
+  double whole[3][3] = {{0}}, square = 0;
   for (size_t i = 0; i < zone; ++i) {
+    for (size_t j = 0; j < zone; ++j) whole[i % 3][j % 3] += e->schur[i * zone + j];
     e->way[i] = 0;
     for (size_t j = 0; j < zone; ++j)
       e->way[i] += (double)shown->give_m_n[j * l->width + i] * e->load[j];
   }
+  for (int k = 0; k < 9; ++k) square += whole[k / 3][k % 3] * whole[k / 3][k % 3];
+  shown->stiffness_n_m = sqrt(square);
   for (uint32_t k = 0; k < e->zone_count; ++k) {
     const uint32_t node = e->zone_node[k];
     const double *way = e->way + 3 * (size_t)k;
