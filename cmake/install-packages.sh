@@ -73,6 +73,7 @@ package_packages() {
   need_command dh debhelper
   need_command dh_python3 dh-python
   need_command lintian lintian
+  need_command reuse reuse
 }
 
 check_node() {
