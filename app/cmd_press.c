@@ -1,5 +1,6 @@
 // sonde press: settles a probe at a site to a force or a depth and reports what is felt and seen.
 #include "options.h"
+#include "press_solid.h"
 #include "settled.h"
 
 #include <assert.h>
@@ -13,7 +14,8 @@ typedef struct options {
   long site;               // -1: at the station
   double force_n, depth_m; // NaN when not asked for, as all below
   double cuff_pa, vein_depth_m, venous_pa, thrombus_pa, wall_pa, sheath;
-  bool json;
+  const char *moduli;
+  bool solid, json;
 } options;
 
 static const options DEFAULTS = {.site = -1,
@@ -55,6 +57,13 @@ static const app_option TABLE[] = {
     OPT_TEXT(preset, "preset", "FILE",
              "damping, stiffness and friction, see sonde-identify(1); a settled probe feels the "
              "stiffness only"),
+    OPT_FLAG(
+        solid, "solid",
+        "press the hyperelastic solid of a site instead of the springs, to equilibrium: force, "
+        "penetration, work and area; it has no vessels"),
+    OPT_TEXT(
+        moduli, "moduli", "FILE",
+        "materials of the solid, as sonde fit --solid writes them; default those of the study"),
     OPT_OUTPUT(image, "image", "PNG",
                "write the echographic image of the settled state, 512 x 512 pixels"),
     OPT_JSON(json)};
@@ -89,6 +98,55 @@ static void print_vessel(const char *name, const sonde_vessel_state *v, bool cut
     snprintf(key, sizeof key, "%s_%s", name, row[i].what);
     app_json_real(key, cut ? row[i].value : nan);
   }
+}
+
+// The solid, with the keys of the springs: null where it has no such thing.
+static int run_solid(const options *o) {
+  press_solid p = {.model = o->model,
+                   .probe = o->probe,
+                   .moduli = o->moduli,
+                   .site = o->site,
+                   .depth_m = o->depth_m,
+                   .force_n = o->force_n};
+  const sonde_vessel_state none = {0};
+  sonde_error error = {0};
+  app_progress_begin("pressing");
+  const sonde_status status = press_solid_find(&p, &error);
+  app_progress_end();
+  if (status) return app_fail("press", &error);
+  const sonde_equilibrium_result *r = &p.result;
+  const double work_mj = 1e3 * (r->tissue_j + r->contact_j);
+  if (!o->json) {
+    printf("site %ld, probe %s, solid\n", o->site, o->probe);
+    printf("force         %8.3f N\n", p.force_n);
+    printf("penetration   %8.2f mm\n", p.depth_m * 1e3);
+    printf("work          %8.3f mJ\n", work_mj);
+    printf("area          %8.1f mm2 of the skin at rest\n", 1e6 * r->area_m2);
+    printf("residual      %8.1e of the contact force (%u steps)\n", r->residual, r->steps);
+    return APP_OK;
+  }
+  app_json_begin();
+  app_json("force_n:%g penetration_mm:%g reaction_n:%g contact_n:%g work_mj:%g area_mm2:%g",
+           p.force_n, p.depth_m * 1e3, p.reaction_n, p.reaction_n, work_mj, 1e6 * r->area_m2);
+  print_vessel("vein", &none, false);
+  print_vessel("artery", &none, false);
+  app_json("vein_short_mm:%g residual:%g steps:%u", (double)NAN, r->residual, r->steps);
+  app_json("tissue:%s probe:%s site:%ld", "solid", o->probe, o->site);
+  app_json_end();
+  return APP_OK;
+}
+
+static int check(void *from) {
+  const options *o = from;
+  static const char *const SPRINGS[] = {"station",     "cuff-mmhg",    "case",     "vein-depth-mm",
+                                        "venous-mmhg", "thrombus-kpa", "wall-kpa", "sheath",
+                                        "preset",      "image"};
+  if (!o->solid && o->moduli) return app_usage_error("press", "--moduli goes with --solid");
+  for (size_t k = 0; k < sizeof SPRINGS / sizeof *SPRINGS && o->solid; ++k)
+    if (app_option_given(SPRINGS[k]))
+      return app_usage_error("press", "--solid goes without --%s: it has layers only", SPRINGS[k]);
+  if (o->solid && o->site < 0) return app_usage_error("press", "--solid needs --site");
+  return APP_OK;
 }
 
 static void print(const press *p, const options *o) {
@@ -156,6 +214,7 @@ static double find_closing_cuff(const press *p) {
 
 static int run(void *from) {
   const options *o = from;
+  if (o->solid) return run_solid(o);
   const bool cuff = !isnan(o->cuff_pa);
   assert(cuff + !isnan(o->force_n) + !isnan(o->depth_m) == 1);
   press p = {.vein_depth_m = o->vein_depth_m, .closes_pa = NAN};
@@ -226,11 +285,14 @@ const app_command cmd_press = {
     .summary = "press once, settle, report force, penetration and vessels",
     .usage = "[MODEL] [--station NAME | --site K] (--force-n F | --depth-mm D | --cuff-mmhg P) "
              "[options]",
-    .text = "Presses a probe on the thigh until everything is at rest and reports the force, the "
-            "penetration and the state of the vein and the artery below it.",
+    .text =
+        "Presses a probe on the thigh until everything is at rest and reports the force, the "
+        "penetration and the state of the vein and the artery below it. With --solid the tissue "
+        "is the hyperelastic solid of sonde-solve(1) in place of the model's springs.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .defaults = &DEFAULTS,
     .one_of = "force-n depth-mm cuff-mmhg",
     .not_both = "station site",
+    .check = check,
     .run = run};

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # sonde fit --solid: a coarse solid fitted to one site predicts another and a third probe; sonde solve takes its table of
-# moduli; what does not fit together is refused.
+# moduli; sonde press --solid finds the depth that bears the force of a depth; what does not fit together is refused.
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/common.sh"
 fit=(fit "$DATA/indentation.csv" --surface "$DATA/skin.ply" --sites "$DATA/sites.csv" --solid)
@@ -11,6 +11,12 @@ gives "fitted.all.count>=6 fitted.all.count<=6 fitted.ln_rms<=0.1 left_out.all.c
   -o "$work/moduli.csv" --json
 gives 'contact=bonded' solve "$MODEL" --site 27 --depths 1 --contact bonded --edge-mm 25 --growth 3 --moduli "$work/moduli.csv" --json
 rejects 'goes without --fat' solve "$MODEL" --site 27 --depths 1 --moduli "$work/moduli.csv" --fat 1:8
+gives 'tissue=solid site=27 penetration_mm=1 work_mj:number' press "$MODEL" --solid --site 27 --depth-mm 1 --moduli "$work/moduli.csv" --json
+force=$(sed -n 's/.*"force_n": \([0-9.]*\),.*/\1/p' "$out")
+gives 'penetration_mm>=0.999 penetration_mm<=1.001' press "$MODEL" --solid --site 27 --force-n "$force" --moduli "$work/moduli.csv" --json
+rejects '\--solid goes without --case' press "$MODEL" --solid --site 27 --depth-mm 1 --case healthy
+rejects '\--solid needs --site' press "$MODEL" --solid --depth-mm 1
+rejects '\--moduli goes with --solid' press "$MODEL" --site 27 --depth-mm 1 --moduli "$work/moduli.csv"
 rejects 'site 99 has no measurements' "${fit[@]}" --at 99 -o "$work/none.csv"
 rejects '\--at: expected' "${fit[@]}" --at 1,x -o "$work/none.csv"
 rejects '\--solid goes without' "${fit[@]}" --model linear -o "$work/none.csv"
