@@ -708,13 +708,22 @@ static int run(void *from) {
   return code;
 }
 
+// Many subjects have a form of their own.
+static const app_command *pick(int argc, char **argv) {
+  for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; ++i)
+    if (strncmp(argv[i], "--cohort", 8) == 0 && (!argv[i][8] || argv[i][8] == '='))
+      return &fit_cohort;
+  return NULL;
+}
+
 const app_command cmd_fit = {
     .verb = "fit",
     .summary = "fit a thigh to measurements and write a model file",
     .usage =
         "MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODEL [options]\n"
         "MEASUREMENTS.csv --surface SKIN.ply --sites SITES.csv -o MODULI.csv --solid [options]\n"
-        "--sample TABLE.csv [--exponent N] [--area-mm2 A --height-mm H] [--json]",
+        "--sample TABLE.csv [--exponent N] [--area-mm2 A --height-mm H] [--json]\n"
+        "--cohort LIST -o DIR [--shard I/N] [--json] [-- OPTIONS]",
     .text = "Estimates the normal springs f(x) = x/(a x + b) of every site, carries them over the "
             "refined skin and writes a thigh model. Stage 1 fits every curve by itself; stage 2 "
             "one pair of parameters per site and one uniform edge stiffness, with the neighbours "
@@ -727,4 +736,5 @@ const app_command cmd_fit = {
     .required = "MEASUREMENTS.csv surface sites o",
     .form = "sample",
     .check = check,
+    .pick = pick,
     .run = run};

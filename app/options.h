@@ -90,6 +90,8 @@ extern const app_command cmd_run, cmd_fit, cmd_generate, cmd_limb, cmd_predict, 
     cmd_identify, cmd_press, cmd_image, cmd_cut, cmd_simulate, cmd_reconstruct, cmd_slice,
     cmd_replay, cmd_bench, cmd_exam, cmd_class, cmd_cases, cmd_scanner, cmd_validate, cmd_paper,
     cmd_devices, cmd_doppler, cmd_solve, cmd_dataset, cmd_course, cmd_send;
+// The form of sonde fit for many subjects.
+extern const app_command fit_cohort;
 
 // Options for the parameters of a struct that stands at `at` in the command's options: what a
 // command's `extend` returns. The first `room` of `count` are written.

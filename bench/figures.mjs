@@ -242,6 +242,11 @@ const GROUPS = {
       }
     },
   },
+  // Many subjects by one process and by two ranks of MPI.
+  cohort: {
+    sources: ['app/fit_cohort.c', 'bench/cohort.py', 'src/sonde-fit/fit'],
+    measure: bin => python(bin, 'bench/cohort.py', bin),
+  },
   // Frames that readers of OpenIGTLink get at 60 Hz beside one that never reads.
   igtl: {
     sources: ['src/sonde-exam/stream/igtl_message.c', 'src/sonde-exam/stream/igtl_server.c', 'bench/bench_igtl.c', 'bench/igtl.py'],

@@ -55,6 +55,7 @@ test_packages() {
   has chromium || has google-chrome || missing+=(chromium)
   need_command mandoc mandoc
   need_command teem-unu teem-apps
+  need_command mpirun openmpi-bin # starts ranks of a cohort
   need_command dciodvfy dicom3tools # validates DICOM files
   need_command storescp dcmtk       # reads them, and is an archive to send them to
   installed libopenigtlink-dev || missing+=(libopenigtlink-dev) # a receiver of OpenIGTLink, and its

@@ -10,6 +10,7 @@ verbs=$("$sonde" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]*\)  .*/\1/p')
 for verb in $verbs; do
   {
     "$sonde" "$verb" --help --json
+    [[ $verb != fit ]] || "$sonde" fit --cohort list --help --json
     [[ $verb != bench ]] || "$sonde" bench --scene image --help --json
   } | awk -v date="$date" -f "$here/manual.awk" >"$to/sonde-$verb.1"
   [[ -e $here/$verb.mdoc ]] && notes=$here/$verb.mdoc || notes=/dev/null

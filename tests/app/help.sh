@@ -47,7 +47,8 @@ for verb in "${!options[@]}"; do
   done
   # In mdoc "Fl -seconds" is --seconds.
   there=$(sed 's/Fl -\([a-z]\)/ --\1/g' "$man/sonde-$verb.1" | listed)
-  here=$({ cat "$out"; [[ $verb != bench ]] || "$SONDE" bench --scene image --help; } | listed)
+  here=$({ cat "$out"; [[ $verb != bench ]] || "$SONDE" bench --scene image --help
+    [[ $verb != fit ]] || "$SONDE" fit --cohort list --help; } | listed)
   [[ $here == "$there" ]] ||
     wrong "sonde $verb: --help and manual differ: $(diff <(echo "$here") <(echo "$there") | grep '^[<>]' | tr '\n' ' ')"
   gives "command=$verb summary:text usage:text text:text" "$verb" --help --json
