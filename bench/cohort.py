@@ -18,7 +18,7 @@ HOME = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "data", "t
 
 def main():
     folder = os.path.abspath(sys.argv[1])
-    subjects, stages, rounds = (int(v) for v in (sys.argv[2:] + ["8", "2", "3"][len(sys.argv) - 2:]))
+    subjects, stages, rounds = (int(v) for v in (sys.argv[2:] + ["6", "2", "5"][len(sys.argv) - 2:]))
     home = os.path.abspath(HOME)
     with tempfile.TemporaryDirectory() as work:
         rows = open(os.path.join(home, "indentation.csv"), encoding="utf-8").read().splitlines()
@@ -51,8 +51,10 @@ def main():
             if names != sorted(os.listdir(two)) or filecmp.cmpfiles(one, two, names, shallow=False)[0] != names:
                 sys.exit("one process and two ranks leave other bytes")
         one_s, two_s = (statistics.median(times[k]) for k in times)
+        ratios = [a / b for a, b in zip(times[1], times[2])]
         print(json.dumps({"subjects": subjects, "stages": stages, "rounds": rounds, "one_s": one_s, "two_s": two_s,
-                          "speed_up": one_s / two_s, "load": load}))
+                          "speed_up": {"least": min(ratios), "median": statistics.median(ratios), "most": max(ratios)},
+                          "load": load}))
 
 
 main()
