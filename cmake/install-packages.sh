@@ -42,6 +42,12 @@ test_packages() {
   installed python3-h5py || missing+=(python3-h5py)
   need_command ld.lld lld # links hundreds of tests in a third of the time
   need_command clang clang
+  if [[ $(uname -m) == x86_64 ]]; then # another C library and another processor give the same bits
+    need_command musl-gcc musl-tools
+    need_command aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
+    installed libc6-dev-arm64-cross || missing+=(libc6-dev-arm64-cross)
+    need_command qemu-aarch64 qemu-user
+  fi
   need_command clang-format-14 clang-format-14
   need_command clang-tidy-14 clang-tidy-14
   need_command doxygen doxygen

@@ -28,7 +28,7 @@ static uint64_t hash_of(const sonde_model *m) {
 // The same with gcc and clang.
 static void hashes_are_golden(void **state) {
   (void)state;
-  const uint64_t golden[] = {0xb5eb98f8a7eedfdeu, 0xb84af3c04004460au, 0x24b7df01aa5a02fbu};
+  const uint64_t golden[] = {0x97408cfc74cc4577u, 0xf2b1179531e8cf53u, 0x24b7df01aa5a02fbu};
   sonde_thigh_def def = coarse();
   int wrong = 0;
   for (uint64_t seed = 1; seed <= 3; ++seed) {

@@ -202,6 +202,18 @@ expect green "the same with an exception" "${hot[@]}"
 rm -r "$tree/build"
 expect red "hot object that was not built" "${hot[@]}"
 
+fresh; elementary=("$house/elementary.sh" "$tree/build" "$nm")
+compile world step.c 'double floor(double); double sonde_math_sin(double);
+  double f(double a) { return floor(a) + sonde_math_sin(a); }'
+expect green "object that calls what is exact" "${elementary[@]}"
+for call in 'double sin(double); double f(double a) { return sin(a); }' \
+  'float powf(float, float); float f(float a) { return powf(a, 0.3f); }' \
+  'double fmax(double, double); double (*f)(double, double) = fmax;' \
+  '_Complex double f(_Complex double a) { return 1 / a; }'; do
+  compile world step.c "$call"
+  expect red "object: $call" "${elementary[@]}"
+done
+
 fresh; library 'int sonde_one(int a) { return a; }'
 library 'int sonde_one(int); int sonde_user(int a) { return sonde_one(a); }' user
 echo 'SONDE_API int sonde_user(int a);' >>"$tree/include/sonde/base.h"

@@ -13,11 +13,6 @@ const char *sonde_distribution_name(sonde_distribution_kind kind) {
   return NAMES[kind];
 }
 
-static double log_gamma(double x) {
-  int sign;
-  return lgamma_r(x, &sign);
-}
-
 // What does not depend on the value, so that a sample pays for it once.
 static double log_factor(const sonde_distribution *d) {
   double nu = d->freedom;
@@ -25,8 +20,7 @@ static double log_factor(const sonde_distribution *d) {
   case SONDE_NORMAL: return -log(d->scale) - 0.5 * log(2 * SONDE_PI);
   case SONDE_LAPLACE: return -log(2 * d->scale);
   default:
-    return log_gamma(0.5 * (nu + 1)) - log_gamma(0.5 * nu) - 0.5 * log(nu * SONDE_PI) -
-           log(d->scale);
+    return lgamma(0.5 * (nu + 1)) - lgamma(0.5 * nu) - 0.5 * log(nu * SONDE_PI) - log(d->scale);
   }
 }
 

@@ -3,7 +3,7 @@
 
 #include "base/base.h"
 
-#include <math.h>
+#include "base/elementary.h"
 
 // Damps until a trial lowers the cost. *going: there is another step.
 static sonde_status step(const sonde_marquardt *m, double *damping, sonde_marquardt_result *r,

@@ -1,7 +1,7 @@
 // The rows of an estimation by site, probe and depth, and those that take no part.
 #include "fit/fit_inside.h"
 
-#include <math.h>
+#include "base/elementary.h"
 #include <string.h>
 
 typedef struct sort_key {

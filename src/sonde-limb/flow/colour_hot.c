@@ -10,7 +10,7 @@ enum { LINES = SONDE_COLOUR_LINES, ROWS = SONDE_COLOUR_ROWS };
 
 // What a cell's loss leaves of its amplitude.
 static float amplitude_of(const sonde_colour_cell *cell) {
-  return cell->loss_db > 0 ? powf(10, -cell->loss_db / 20) : 1;
+  return cell->loss_db > 0 ? expf(-0.11512925f * cell->loss_db) : 1;
 }
 
 // Echoes of blood in its cells: patterns that turn with the motion along the beam and are renewed

@@ -44,6 +44,13 @@ void sonde_flow_follow(double profile_m_s[SONDE_FLOW_RINGS], double radius_m, do
   profile_m_s[INNER] = 0;
 }
 
+// The unit number at an angle, and a quotient: those of C differ in their last bits between
+// libraries.
+static double complex at_angle(double angle_rad) { return cos(angle_rad) + I * sin(angle_rad); }
+static double complex over(double complex a, double complex b) {
+  return a * conj(b) / (creal(b) * creal(b) + cimag(b) * cimag(b));
+}
+
 // Bessel functions of the first kind, orders 0 and 1, by their series: |z| <= 20 or so.
 static void bessel(double complex z, double complex *j0, double complex *j1) {
   double complex square = -0.25 * z * z, term = 1;
@@ -63,19 +70,19 @@ void sonde_flow_pulsed(const double *mean_m_s, uint32_t samples, double radius_m
     // Fourier coefficient of the mean velocity, at the phase.
     double complex c = 0;
     for (uint32_t i = 0; i < samples; ++i)
-      c += mean_m_s[i] * cexp(-2 * SONDE_PI * I * h * ((double)i / samples - phase));
+      c += mean_m_s[i] * at_angle(-2 * SONDE_PI * h * ((double)i / samples - phase));
     c *= (h ? 2.0 : 1.0) / samples;
     if (h == 0) {
       sonde_flow_steady(creal(c), profile_m_s);
       continue;
     }
     double alpha = radius_m * sqrt(2 * SONDE_PI * rate_hz * h / BLOOD_M2_S);
-    double complex lambda = alpha * cexp(0.75 * SONDE_PI * I), j0, j1, inner, unused;
+    double complex lambda = alpha * at_angle(0.75 * SONDE_PI), j0, j1, inner, unused;
     bessel(lambda, &j0, &j1);
-    double complex below = j0 - 2 * j1 / lambda;
+    double complex below = j0 - over(2 * j1, lambda);
     for (int k = 0; k < SONDE_FLOW_RINGS; ++k) {
       bessel(lambda * k / (SONDE_FLOW_RINGS - 1), &inner, &unused);
-      profile_m_s[k] += creal(c * (j0 - inner) / below);
+      profile_m_s[k] += creal(over(c * (j0 - inner), below));
     }
   }
 }

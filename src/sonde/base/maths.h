@@ -4,7 +4,7 @@
 
 #include "sonde/base.h"
 
-#include <math.h>
+#include "base/elementary.h"
 
 #define SONDE_PI 3.14159265358979323846
 

@@ -6,7 +6,7 @@
 #ifndef SONDE_SRC_RANDOM_H
 #define SONDE_SRC_RANDOM_H
 
-#include <math.h>
+#include "base/elementary.h"
 #include <stdint.h>
 
 static inline uint64_t sonde_random_mix(uint64_t x) {

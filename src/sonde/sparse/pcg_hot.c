@@ -4,7 +4,7 @@
 #include "base/base.h"
 #include "base/vector.h"
 
-#include <math.h>
+#include "base/elementary.h"
 
 INLINE double dot(const sonde_operator *a, const double *x, const double *y, uint32_t width) {
   double sum = 0;
