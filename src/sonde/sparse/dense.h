@@ -57,7 +57,7 @@ SONDE_LINK void sonde_front_forward(const float *front, uint32_t n, uint32_t own
 SONDE_LINK void sonde_front_backward(const float *front, uint32_t n, uint32_t own, double *x);
 
 // The widest that this processor runs, or those called `name`; NULL: none of that name.
-SONDE_LINK const sonde_dense_kernels *sonde_dense_kernels_find(const char *name);
+const sonde_dense_kernels *sonde_dense_kernels_find(const char *name);
 extern const sonde_dense_kernels sonde_dense_kernels_base;
 #ifdef __x86_64__
 extern const sonde_dense_kernels sonde_dense_kernels_avx2, sonde_dense_kernels_avx512;
