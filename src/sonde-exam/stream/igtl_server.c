@@ -158,9 +158,10 @@ bool sonde_igtl_post(sonde_igtl_server *server, const sonde_frame *frame) {
   }
   pthread_mutex_lock(&server->lock);
   for (client *c = server->client; c < server->client + CLIENTS && made; ++c) {
-    if (c->socket < 0 || c->connecting || c->lost) continue;
+    if (c->socket < 0 || c->connecting) continue;
     if (c->next) ++server->counts.replaced;
     release(&c->next);
+    if (c->lost) continue; // one that waits to be closed holds no frame but the one it was sent
     c->next = spare;
     ++spare->users;
     feed(server, c);
