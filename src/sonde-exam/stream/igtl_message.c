@@ -124,13 +124,9 @@ static void finish(bytes_cursor *out, const igtl_style *style, size_t start,
   put(&sizes, 8, igtl_crc_of(style->crc, body, size));
 }
 
-static void put_image(bytes_cursor *out, const sonde_frame *frame, const igtl_style *style) {
-  const sonde_pose pose = frame->snapshot.world_from_probe;
-  const sonde_vec3 x = q_rotate(pose.rotation, vec3(1, 0, 0)),
-                   y = q_rotate(pose.rotation, vec3(0, 1, 0)),
-                   z = q_rotate(pose.rotation, vec3(0, 0, 1));
-  const double dx_mm = MM * frame->width_m / frame->width,
-               dz_mm = MM * frame->height_m / frame->height;
+// `axis`: the probe's in Reference; `pixel_mm`: along x and z.
+static void put_image(bytes_cursor *out, const sonde_frame *frame, const igtl_style *style,
+                      const sonde_vec3 axis[3], const double pixel_mm[2]) {
   size_t start = begin(out, style, "IMAGE", "Image_Reference");
   put(out, 2, 1); // version of this message, whatever the header's
   put(out, 1, 1); // one number per pixel
@@ -141,10 +137,11 @@ static void put_image(bytes_cursor *out, const sonde_frame *frame, const igtl_st
   put(out, 2, frame->height);
   put(out, 2, 1);
   // Columns along x, rows along z, and right-handed with them; then the middle of the picture.
-  put_point(out, v_scale(x, dx_mm));
-  put_point(out, v_scale(z, dz_mm));
-  put_point(out, v_scale(y, -dx_mm));
-  put_point(out, v_scale(v_madd(pose.position, 0.5 * frame->height_m, z), MM));
+  put_point(out, v_scale(axis[0], pixel_mm[0]));
+  put_point(out, v_scale(axis[2], pixel_mm[1]));
+  put_point(out, v_scale(axis[1], -pixel_mm[0]));
+  const sonde_vec3 face = frame->snapshot.world_from_probe.position;
+  put_point(out, v_scale(v_madd(face, 0.5 * frame->height_m, axis[2]), MM));
   for (int k = 0; k < 3; ++k) put(out, 2, 0); // the part that is sent: all
   put(out, 2, frame->width);
   put(out, 2, frame->height);
@@ -192,12 +189,13 @@ size_t igtl_encode_frame(const sonde_frame *frame, const igtl_style *style, unsi
   const sonde_vec3 turned[3] = {q_rotate(q, vec3(1, 0, 0)), q_rotate(q, vec3(0, 1, 0)),
                                 q_rotate(q, vec3(0, 0, 1))};
   // From pixels to mm of the probe: columns along x, rows along z.
-  const double dx_mm = MM * frame->width_m / frame->width,
-               dz_mm = MM * frame->height_m / frame->height;
-  const sonde_vec3 scaled[3] = {vec3(dx_mm, 0, 0), vec3(0, 0, dz_mm), vec3(0, -dx_mm, 0)};
-  put_image(&out, frame, style);
+  const double pixel_mm[2] = {MM * frame->width_m / frame->width,
+                              MM * frame->height_m / frame->height};
+  const sonde_vec3 scaled[3] = {vec3(pixel_mm[0], 0, 0), vec3(0, 0, pixel_mm[1]),
+                                vec3(0, -pixel_mm[0], 0)};
+  put_image(&out, frame, style, turned, pixel_mm);
   put_transform(&out, style, "ImageToProbe", scaled,
-                vec3(0.5 * (dx_mm - MM * frame->width_m), 0, 0.5 * dz_mm));
+                vec3(0.5 * (pixel_mm[0] - MM * frame->width_m), 0, 0.5 * pixel_mm[1]));
   put_transform(&out, style, "ProbeToReference", turned, v_scale(s->world_from_probe.position, MM));
   put_force(&out, style, "ProbeForce", s->force_n);
   put_force(&out, style, "ProbeRenderedForce", s->rendered_force_n);
