@@ -47,13 +47,7 @@ static int check_options(void *from) {
     return app_usage_error(VERB, "--check takes no plan, count, seed or shard");
   if (o->format == HDF5 && !dataset_hdf5())
     return app_usage_error(VERB, "this program was built without libhdf5, expected tar or folder");
-  if (!o->shard) return APP_OK;
-  int used = 0;
-  if (sscanf(o->shard, "%9u/%9u%n", &o->part, &o->parts, &used) != 2 || o->shard[used] ||
-      o->part < 1 || o->part > o->parts)
-    return app_usage_error(VERB, "--shard expects I/N with 1 <= I <= N, such as 3/8, got '%s'",
-                           o->shard);
-  return APP_OK;
+  return app_shard(VERB, o->shard, &o->part, &o->parts);
 }
 
 static int run(void *from) {

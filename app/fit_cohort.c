@@ -26,7 +26,14 @@ extern char **environ;
 
 static const char VERB[] = "fit";
 
-enum { MOST_SUBJECTS = 100000, MOST_WORDS = 64, MOST_COLUMNS = 32, PATH_TEXT = 4096, ID_TEXT = 65 };
+enum {
+  MOST_SUBJECTS = 100000,
+  MOST_WORDS = 64,
+  MOST_COLUMNS = 32,
+  MOST_NUMBERS = 64,
+  PATH_TEXT = 4096,
+  ID_TEXT = 65
+};
 
 typedef struct options {
   const char *cohort, *directory, *shard;
@@ -101,12 +108,12 @@ static sonde_status add_subject(cohort *c, const char *id, const char *where, so
   return SONDE_OK;
 }
 
-// Cuts a line into cells. @return how many
+// Cuts a line into cells. @return how many it has, of which the first MOST_COLUMNS are told
 static uint32_t split(char *line, char *cell[MOST_COLUMNS]) {
   uint32_t count = 0;
   line[strcspn(line, "\r\n")] = 0;
-  for (char *at = line; at && count < MOST_COLUMNS; ++count) {
-    cell[count] = at;
+  for (char *at = line; at; ++count) {
+    if (count < MOST_COLUMNS) cell[count] = at;
     at = strchr(at, ',');
     if (at) *at++ = 0;
   }
@@ -125,7 +132,10 @@ static sonde_status read_table(cohort *c, const char *path, sonde_error *error) 
     if (line[0] == '#' || line[strspn(line, " \r")] == 0) continue;
     if (!columns) {
       columns = split(line, name);
-      for (uint32_t k = 0; k < columns; ++k) {
+      if (columns > MOST_COLUMNS)
+        status = app_error(error, SONDE_FORMAT, "%s: %u columns, expected at most %d", where,
+                           columns, MOST_COLUMNS);
+      for (uint32_t k = 0; k < columns && !status; ++k) {
         known += strcmp(name[k], "subject") == 0 || strcmp(name[k], "measurements") == 0;
         static const char *const ours[] = {"o", "output", "json", "cohort", "shard", "sample"};
         for (size_t i = 0; i < sizeof ours / sizeof *ours && !status; ++i)
@@ -373,7 +383,7 @@ static sonde_status conclude(const cohort *c, uint32_t *whole, uint32_t *fitted,
                              sonde_error *error) {
   sonde_json **result = calloc(c->count, sizeof *result);
   sonde_status status = result ? SONDE_OK : app_error(error, SONDE_MEMORY, "out of memory");
-  column columns[MOST_COLUMNS];
+  column columns[MOST_NUMBERS];
   uint32_t count = 0;
   *whole = *fitted = 0;
   for (uint32_t k = 0; k < c->count && !status; ++k) {
@@ -382,9 +392,10 @@ static sonde_status conclude(const cohort *c, uint32_t *whole, uint32_t *fitted,
     if (!result[k] || !is_fitted(result[k])) continue;
     const sonde_json *fit = sonde_json_member(result[k], "fit");
     // The first fitted subject names the columns.
-    for (const sonde_json *v = *fitted ? NULL : sonde_json_first(fit); v && count < MOST_COLUMNS;
-         v = sonde_json_next(v))
+    for (const sonde_json *v = *fitted ? NULL : sonde_json_first(fit); v; v = sonde_json_next(v)) {
+      assert(count < MOST_NUMBERS);
       columns[count++] = (column){.key = sonde_json_key(v), .least = INFINITY, .most = -INFINITY};
+    }
     ++*fitted;
     for (column *n = columns; n < columns + count; ++n) {
       const double value = sonde_json_as_number(sonde_json_member(fit, n->key));
@@ -443,11 +454,7 @@ static int check(void *from) {
     o->part = (uint32_t)part, o->parts = (uint32_t)parts;
     break;
   }
-  int used = 0;
-  if (o->shard && (sscanf(o->shard, "%9u/%9u%n", &o->part, &o->parts, &used) != 2 ||
-                   o->shard[used] || o->part < 1 || o->part > o->parts))
-    return app_usage_error(VERB, "--shard expects I/N with 1 <= I <= N, such as 3/8, got '%s'",
-                           o->shard);
+  if (app_shard(VERB, o->shard, &o->part, &o->parts)) return APP_BAD_INPUT;
   static const char *const ours[] = {"-o", "--output", "--json", "--cohort", "--shard", "--sample"};
   for (char **word = o->rest; word && *word; ++word)
     for (size_t k = 0; k < sizeof ours / sizeof *ours; ++k)

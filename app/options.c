@@ -334,6 +334,14 @@ uint32_t app_list_parameters(app_option *list, uint32_t room, const sonde_parame
   return count;
 }
 
+int app_shard(const char *verb, const char *text, uint32_t *part, uint32_t *parts) {
+  int used = 0;
+  if (!text || (sscanf(text, "%9u/%9u%n", part, parts, &used) == 2 && !text[used] && *part >= 1 &&
+                *part <= *parts))
+    return APP_OK;
+  return app_usage_error(verb, "--shard expects I/N with 1 <= I <= N, such as 3/8, got '%s'", text);
+}
+
 uint32_t app_read_numbers(const char *text, double low, double high, double *list, uint32_t most) {
   for (uint32_t count = 0; count < most;) {
     const char *end;

@@ -106,6 +106,9 @@ bool app_option_given(const char *name);
 // Reads up to `most` numbers from low to high with commas between them; returns how many, 0 when
 // the text is anything else.
 uint32_t app_read_numbers(const char *text, double low, double high, double *list, uint32_t most);
+// Reads the share of one of several processes, I/N with 1 <= I <= N; NULL leaves both numbers.
+// Returns APP_OK, or the exit code after saying what is wrong.
+int app_shard(const char *verb, const char *text, uint32_t *part, uint32_t *parts);
 void app_command_line(char *text, size_t room);
 
 #endif

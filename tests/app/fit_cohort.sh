@@ -99,5 +99,7 @@ printf 'subject,sites\n' >"$in/head.csv"
 rejects "one column subject and one column measurements" fit --cohort "$in/head.csv" -o x
 printf 'subject,measurements\na\n' >"$in/cells.csv"
 rejects "cells.csv:2: 1 cells, expected 2" fit --cohort "$in/cells.csv" -o x
+echo "subject,measurements$(printf ',name%.0s' {1..31})" >"$in/wide.csv"
+rejects "wide.csv:1: 33 columns, expected at most 32" fit --cohort "$in/wide.csv" -o x
 rejects "no folder has an indentation.csv" fit --cohort "$in" -o x
 finish
