@@ -16,6 +16,8 @@ extern char **environ;
 
 typedef struct options {
   const char *path, *to, *called, *calling;
+  char host[256];   // of `to`
+  const char *port; // behind it
   bool json;
 } options;
 
@@ -28,13 +30,15 @@ static const app_option TABLE[] = {
     OPT_FLAG(json, "json", "print one JSON object: files, sent")};
 
 static int check(void *from) {
-  const options *s = from;
+  options *s = from;
   const char *colon = strrchr(s->to, ':');
   char *end = NULL;
   const long port = colon ? strtol(colon + 1, &end, 10) : 0;
   if (!colon || colon == s->to || s->to[0] == '-' || end == colon + 1 || *end || port < 1 ||
-      port > 65535)
+      port > 65535 || (size_t)(colon - s->to) >= sizeof s->host)
     return app_usage_error("send", "--to expects HOST:PORT as in localhost:104, found '%s'", s->to);
+  memcpy(s->host, s->to, (size_t)(colon - s->to));
+  s->port = colon + 1;
   const char *const names[] = {s->called, s->calling};
   for (int k = 0; k < 2; ++k)
     if (strlen(names[k]) < 1 || strlen(names[k]) > 16 || names[k][0] == '-')
@@ -60,12 +64,9 @@ static sonde_status store(const options *s, const char *path, sonde_error *error
   if (!is_dicom)
     return app_error(error, SONDE_FORMAT,
                      "%.300s: expected a DICOM file, found no DICM at byte 128", path);
-  char host[256];
-  const char *colon = strrchr(s->to, ':');
-  snprintf(host, sizeof host, "%.*s", (int)(colon - s->to), s->to);
   // Words that are not changed, as exec takes them.
-  const char *const words[] = {"storescu", "-R", "-aet",    s->calling, "-aec",
-                               s->called,  host, colon + 1, path,       NULL};
+  const char *const words[] = {"storescu", "-R",    "-aet",  s->calling, "-aec",
+                               s->called,  s->host, s->port, path,       NULL};
   posix_spawn_file_actions_t actions;
   pid_t child;
   int code = posix_spawn_file_actions_init(&actions), ended = 0;
