@@ -181,70 +181,92 @@ static double lumen_grey(sonde_echo *echo, const sonde_model *m, sonde_vec3 midd
   return sum / count;
 }
 
+// The cusps whose root is a place of the model; there is one such body.
+static sonde_map_body cusps_at(const sonde_tissue_map *map, sonde_vec3 root, uint32_t *which) {
+  enum { ROOM = 64 };
+  uint32_t id[ROOM], found = 0;
+  sonde_map_body cusps = {0};
+  const uint32_t count = map->bodies(map->self, root, 0.002, ROOM, id);
+  for (uint32_t i = 0; i < count; ++i) {
+    const sonde_map_body b = map->body(map->self, id[i], root);
+    if (b.tissue != SONDE_TISSUE_CUSPS || v_norm(map->body_place(map->self, id[i], root)) > 1e-6)
+      continue;
+    cusps = b, *which = id[i], ++found;
+  }
+  assert_int_equal(found, 1);
+  return cusps;
+}
+
 // Each valve's cusps are a body rooted on the vein's middle, whose length runs along the vein
-// towards the heart; a section through them is brighter inside than one below their roots.
+// towards the heart.
 static void cusps_stand_in_their_veins(void **state) {
   (void)state;
-  uint32_t seen = 0, shown = 0, brighter = 0;
+  uint32_t seen = 0;
   for (uint32_t k = 0; k < MODELS; ++k) {
-    const sonde_model *m = model[k];
-    const sonde_limb *limb = sonde_limb_of(m);
-    const sonde_tissue_map *map = m->map;
-    sonde_interior *in = NULL;
-    sonde_echo *echo = NULL;
-    sonde_pathology healthy;
-    sonde_vec3 *still = SONDE_NEW(sonde_vec3, m->surface.vertex_count);
-    assert_int_equal(sonde_interior_create(m, &in, NULL), SONDE_OK);
-    sonde_interior_set_method(in, SONDE_INTERIOR_COLUMNS);
-    assert_int_equal(sonde_pathology_preset("healthy", &healthy, NULL), SONDE_OK);
-    assert_int_equal(sonde_echo_create(in, NULL, &echo, NULL), SONDE_OK);
-    sonde_interior_update(in, &(sonde_interior_input){.positions_m = m->surface.vertices,
-                                                      .contact_forces_n = still,
-                                                      .world_from_probe = {{0, 0, 0}, {1, 0, 0, 0}},
-                                                      .pathology = &healthy,
-                                                      .dt_s = -1,
-                                                      .tick = 1,
-                                                      .face_half_x_m = 0.02,
-                                                      .face_half_y_m = 0.01});
-    for (uint32_t v = 0; v < sonde_limb_vessel_count(limb); ++v) {
-      const sonde_limb_vessel vessel = sonde_limb_vessel_get(limb, v);
-      for (uint32_t n = 0; n < vessel.valves; ++n) {
+    const sonde_limb *limb = sonde_limb_of(model[k]);
+    const sonde_tissue_map *map = model[k]->map;
+    for (uint32_t v = 0; v < sonde_limb_vessel_count(limb); ++v)
+      for (uint32_t n = 0; n < sonde_limb_vessel_get(limb, v).valves; ++n, ++seen) {
         const sonde_limb_valve valve = sonde_limb_vessel_valve(limb, v, n);
         const double above = fmax(valve.arc_m - 0.8 * valve.cusp_m, 0);
-        const sonde_limb_vessel_point at = sonde_limb_vessel_place(limb, v, valve.arc_m),
-                                      next = sonde_limb_vessel_place(limb, v, above);
-        const sonde_vec3 root = sonde_limb_to_model(limb, at.centre_m),
-                         end = sonde_limb_to_model(limb, next.centre_m);
-        enum { ROOM = 64 };
-        uint32_t id[ROOM], found = 0;
-        const uint32_t count = map->bodies(map->self, root, 0.002, ROOM, id);
-        for (uint32_t i = 0; i < count; ++i) {
-          const sonde_vec3 q = map->body_place(map->self, id[i], root),
-                           e = map->body_place(map->self, id[i], end);
-          const sonde_map_body b = map->body(map->self, id[i], root);
-          if (b.tissue != SONDE_TISSUE_CUSPS || v_norm(q) > 1e-6) continue;
-          ++found;
-          assert_near(b.half_m.z, valve.cusp_m, 1e-9);
-          if (above > 0)
-            assert_true(e.z > 0.6 && e.z < 0.81 && v_dot(b.axis, v_sub(end, root)) > 0);
-          if (k || !(strcmp(vessel.name, "femoral vein") == 0) || above <= 0) continue;
-          const double grey = lumen_grey(echo, m, end, b.axis, at.radius_m),
-                       below =
-                           lumen_grey(echo, m, v_madd(root, -2e-3, b.axis), b.axis, at.radius_m);
-          print_message("%s, %.0f mm: grey %.1f through the cusps, %.1f below\n", vessel.name,
-                        1e3 * valve.arc_m, grey, below);
-          ++shown, brighter += grey > below + 3;
-        }
-        assert_int_equal(found, 1);
-        ++seen;
+        const sonde_vec3 root =
+            sonde_limb_to_model(limb, sonde_limb_vessel_place(limb, v, valve.arc_m).centre_m);
+        const sonde_vec3 end =
+            sonde_limb_to_model(limb, sonde_limb_vessel_place(limb, v, above).centre_m);
+        uint32_t which;
+        const sonde_map_body cusps = cusps_at(map, root, &which);
+        assert_near(cusps.half_m.z, valve.cusp_m, 1e-9);
+        if (!(above > 0)) continue;
+        const sonde_vec3 q = map->body_place(map->self, which, end);
+        assert_true(q.z > 0.6 && q.z < 0.81 && v_dot(cusps.axis, v_sub(end, root)) > 0);
       }
-    }
-    sonde_echo_destroy(echo);
-    sonde_interior_destroy(in);
-    sonde_free(still);
   }
-  print_message("%u valves, %u of %u brighter\n", seen, brighter, shown);
-  assert_true(seen > 150 && shown >= 2 && brighter == shown);
+  print_message("%u valves\n", seen);
+  assert_true(seen > 150);
+}
+
+// A section through the cusps of a femoral valve is brighter inside than one below their roots.
+static void pictures_show_cusps(void **state) {
+  (void)state;
+  const sonde_model *m = model[0];
+  const sonde_limb *limb = sonde_limb_of(m);
+  sonde_interior *in = NULL;
+  sonde_echo *echo = NULL;
+  sonde_pathology healthy;
+  sonde_vec3 *still = SONDE_NEW(sonde_vec3, m->surface.vertex_count);
+  assert_int_equal(sonde_interior_create(m, &in, NULL), SONDE_OK);
+  sonde_interior_set_method(in, SONDE_INTERIOR_COLUMNS);
+  assert_int_equal(sonde_pathology_preset("healthy", &healthy, NULL), SONDE_OK);
+  assert_int_equal(sonde_echo_create(in, NULL, &echo, NULL), SONDE_OK);
+  sonde_interior_update(in, &(sonde_interior_input){.positions_m = m->surface.vertices,
+                                                    .contact_forces_n = still,
+                                                    .world_from_probe = {{0, 0, 0}, {1, 0, 0, 0}},
+                                                    .pathology = &healthy,
+                                                    .dt_s = -1,
+                                                    .tick = 1,
+                                                    .face_half_x_m = 0.02,
+                                                    .face_half_y_m = 0.01});
+  const uint32_t femoral = sonde_limb_vessel_find(limb, "femoral vein");
+  uint32_t shown = 0, brighter = 0, which;
+  for (uint32_t n = 0; n < sonde_limb_vessel_get(limb, femoral).valves; ++n) {
+    const sonde_limb_valve valve = sonde_limb_vessel_valve(limb, femoral, n);
+    const double above = valve.arc_m - 0.8 * valve.cusp_m;
+    if (!(above > 0)) continue;
+    const sonde_limb_vessel_point at = sonde_limb_vessel_place(limb, femoral, valve.arc_m);
+    const sonde_vec3 root = sonde_limb_to_model(limb, at.centre_m);
+    const sonde_vec3 end =
+        sonde_limb_to_model(limb, sonde_limb_vessel_place(limb, femoral, above).centre_m);
+    const sonde_vec3 up = cusps_at(m->map, root, &which).axis;
+    const double grey = lumen_grey(echo, m, end, up, at.radius_m),
+                 below = lumen_grey(echo, m, v_madd(root, -2e-3, up), up, at.radius_m);
+    print_message("%.0f mm: grey %.1f through the cusps, %.1f below\n", 1e3 * valve.arc_m, grey,
+                  below);
+    ++shown, brighter += grey > below + 3;
+  }
+  assert_true(shown >= 2 && brighter == shown);
+  sonde_echo_destroy(echo);
+  sonde_interior_destroy(in);
+  sonde_free(still);
 }
 
 static void springs_follow_the_tissue_below(void **state) {
@@ -356,6 +378,7 @@ int main(void) {
       cmocka_unit_test(powers_are_those_of_the_labels),
       cmocka_unit_test(bodies_are_those_of_the_labels),
       cmocka_unit_test(cusps_stand_in_their_veins),
+      cmocka_unit_test(pictures_show_cusps),
       cmocka_unit_test(springs_follow_the_tissue_below),
       cmocka_unit_test(vessels_run_down_under_their_landmarks),
       cmocka_unit_test(a_left_model_is_the_mirror),

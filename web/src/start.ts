@@ -156,8 +156,7 @@ export class StartDialog {
     const intro = recall("trained") ? "Choose a case, or practise freely." : "New here? Press Start: the page leads you through a first exam.";
     const all = hello.case_list ?? [];
     const levels = [...new Set(all.map((c: CaseInfo) => c.level))];
-    const seen = all.filter((c) => !this.level || c.level === this.level);
-    const cases = seen.map((c: CaseInfo) => ({ id: c.id, title: c.title, text: c.history, tag: LEVELS[c.level] }));
+    const cases = this.seen(all).map((c: CaseInfo) => ({ id: c.id, title: c.title, text: c.history, tag: LEVELS[c.level] }));
     const row = make("div", "start-head");
     const choices = [{ id: "", title: `All ${all.length} cases` }, ...levels.map((id) => ({ id: id as string, title: LEVELS[id] }))];
     row.append(make("p", "intro", intro));
@@ -175,10 +174,14 @@ export class StartDialog {
     this.box.replaceChildren(this.head(), row, columns, this.foot());
   }
 
+  private seen(list: CaseInfo[]): CaseInfo[] {
+    return list.filter((c) => !this.level || c.level === this.level);
+  }
+
   /** Shows the cases of one level; one of them is chosen. */
   private choose(level: string, hello: Hello): void {
     this.level = level;
-    const seen = (hello.case_list ?? []).filter((c) => !level || c.level === level);
+    const seen = this.seen(hello.case_list ?? []);
     if (!seen.some((c) => c.id === this.wish.case)) this.wish.case = seen[0]?.id ?? "";
     this.build(hello);
   }
