@@ -29,7 +29,7 @@ if command -v dciodvfy >/dev/null; then
   dciodvfy a.dcm >"$out" 2>&1 || true
   { grep -q USMultiFrameImage "$out" && ! grep -q '^Error' "$out"; } || wrong "dciodvfy: $(<"$out")"
 else
-  echo "not validated: dicom3tools is not there"
+  wrong "dicom3tools is not there, which validates DICOM files"
 fi
 rm a.igs.mha
 
@@ -56,7 +56,7 @@ s = socket.create_server(("127.0.0.1", 0)); print(s.getsockname()[1])')
   run send a.dcm --to "127.0.0.1:$port"
   ((status == 1)) && grep -q "was not stored at 127.0.0.1:$port" "$err" || wrong "an archive that is gone"
 else
-  echo "not sent: dcmtk is not there"
+  wrong "dcmtk is not there, an archive to send to"
 fi
 checks=$((checks + 1))
 status=0

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# sonde fit --cohort: one process, two shards, a run that was killed, and mpirun where it is there leave the
+# sonde fit --cohort: one process, two shards, a run that was killed, and mpirun leave the
 # same bytes; a subject that fails stops no other.
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/common.sh"
@@ -84,7 +84,7 @@ if command -v mpirun >/dev/null; then
   grep -q "process 2 of 2: 1 subjects fitted now" "$out" || wrong "the ranks: $(<"$out")"
   diff -rq good ranks >"$err" 2>&1 || wrong "two ranks and one differ: $(<"$err")"
 else
-  echo "not run by ranks: openmpi-bin is not there"
+  wrong "openmpi-bin is not there, which starts ranks"
 fi
 
 rejects "I/N with 1" fit --cohort "$in/list.csv" -o x --shard 3/2
