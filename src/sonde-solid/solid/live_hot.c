@@ -148,20 +148,23 @@ static void ease(sonde_solid_live *l, sonde_pose pose, bool touches, sonde_solid
 
 void sonde_solid_live_tick(sonde_solid_live *l, sonde_pose pose, sonde_solid_contact *contact) {
   SONDE_ASSERT(l != NULL && contact != NULL);
+  sonde_solid_contact last;
+  bool renewed = false;
   if (l->ticks++ % l->def.pass_ticks == 0) { // takes over the pass that is due, asks for the next
     const uint32_t asked = atomic_load_explicit(&l->asked, memory_order_relaxed);
-    if (atomic_load_explicit(&l->done, memory_order_acquire) == asked) {
-      // What the hand would feel on the last tangent at this pose, less what it will feel.
-      sonde_solid_contact last, next;
+    renewed = atomic_load_explicit(&l->done, memory_order_acquire) == asked;
+    if (renewed) {
       (void)touch(l, pose, &last);
       l->serving = asked & 1, l->asked_pose = pose;
       atomic_store_explicit(&l->asked, asked + 1, memory_order_release);
-      (void)touch(l, pose, &next);
-      l->easing_n = v_add(l->easing_n, v_sub(last.force_n, next.force_n));
-      l->easing_nm = v_add(l->easing_nm, v_sub(last.torque_nm, next.torque_nm));
     } else {
       ++l->late;
     }
   }
-  ease(l, pose, touch(l, pose, contact), contact);
+  const bool touches = touch(l, pose, contact);
+  if (renewed) { // the hand goes on from what it would have felt on the last tangent
+    l->easing_n = v_add(l->easing_n, v_sub(last.force_n, contact->force_n));
+    l->easing_nm = v_add(l->easing_nm, v_sub(last.torque_nm, contact->torque_nm));
+  }
+  ease(l, pose, touches, contact);
 }
