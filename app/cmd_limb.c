@@ -131,6 +131,7 @@ typedef struct origin {
   sonde_limb_part_fit part;  // of a measured subject
   sonde_limb_body scanned;   // NaN: not in the scan
   double girth_rms, voxel_m; // limb over scan; of the volume
+  bool long_thigh;           // of a skin alone, for its calf
 } origin;
 
 static const double GIRTHS[] = {0.12, 0.25, 0.5, 0.75, 0.88, 1, 1.15, 1.28, 1.5, 1.75, 1.86};
@@ -180,7 +181,7 @@ static void print_json(const options *a, const sonde_limb *limb, const sonde_lim
     for (uint32_t k = 0; k < count; ++k)
       if (!isnan(*sonde_parameter_of(&from->scanned, &p[k]))) app_json_text(NULL, p[k].name);
     app_json_close();
-    app_json_real("girth_rms_percent", 100 * from->girth_rms);
+    app_json("girth_rms_percent:%g thigh_doubtful:%hhd", 100 * from->girth_rms, from->long_thigh);
     if (a->scan.labels) app_json_real("voxel_mm", 1e3 * from->voxel_m);
     app_json_close();
   }
@@ -308,6 +309,9 @@ static sonde_status write_table(const sonde_limb *limb, const sonde_limb_pose *p
 }
 
 enum { MOST_DRAWS = 32 }; // of what finds room in a scanned leg
+// Thighs of the rules are 1.0 to 1.2 times as long as their calves. A skin that begins above the
+// groin crease makes its thigh longer.
+static const double LONG_THIGH = 1.25;
 
 // The limb of a scan. What is drawn may find no room in it: then it is drawn again, from numbers
 // that no other seed takes. The first complaint is the one to tell.
@@ -328,6 +332,13 @@ static sonde_status make_scanned(const options *a, sonde_limb **limb, origin *fr
     if (!status) status = sonde_limb_create(&body, limb, to);
   }
   if (!status) from->girth_rms = sonde_leg_compare(&girths, *limb);
+  const double thigh = known.thigh_length_m / known.calf_length_m;
+  from->long_thigh = !status && !scan.femur && isnan(a->known.thigh_length_m) && thigh > LONG_THIGH;
+  if (from->long_thigh)
+    fprintf(stderr,
+            "sonde limb: the thigh is %.2f times as long as the calf, which is much: the skin may "
+            "begin above the groin crease. Give --thigh-length-mm or --scan-femur\n",
+            thigh);
   // What was given as a parameter was not measured.
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);

@@ -160,6 +160,15 @@ static void skin_alone_gives_lengths_and_girths(void **state) {
   for (int kind = 0; kind < ROUNDS((int)SONDE_COUNT_OF(KINDS), 1); ++kind) {
     scanned s = make(kind);
     s.scan.skin = &s.skin;
+    // Of a skin that reaches above the groin the thigh's length has to be given.
+    sonde_limb_body uncut = sonde_limb_unknown();
+    sonde_leg_girths above;
+    uncut.sex = s.body.sex, uncut.thigh_length_m = s.body.thigh_length_m;
+    assert_int_equal(sonde_leg_scan_body(&s.scan, 77, &uncut, &above, NULL), SONDE_OK);
+    print_message("%s, uncut: girth of the thigh %.1f of %.1f mm\n", KINDS[kind].name,
+                  1e3 * uncut.girth_thigh_m, 1e3 * s.body.girth_thigh_m);
+    assert_true(fabs(uncut.girth_thigh_m / s.body.girth_thigh_m - 1) < 0.03);
+    assert_true(sonde_leg_compare(&above, s.limb) < 0.02);
     const double knee = cut_at_crease(&s) - s.body.thigh_length_m;
     sonde_limb_body got = measured(&s, KINDS[kind].name, 0.045, 0.02);
     assert_true(isnan(got.head_m) && isnan(got.fat_front_m));

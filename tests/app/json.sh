@@ -40,8 +40,10 @@ gives "seed=7 sex=male side=left parameters.bmi>=23.999 parameters.bmi<=24.001" 
   limb --seed 7 --sex male --bmi 24 --side left --atlas leg --levels 0.5,1.3 --skin scanned.stl --json
 [[ -s leg/section_+0.50.svg && -s leg/section_+1.30.svg && -s leg/view.svg ]] || wrong "sonde limb drew nothing"
 # The skin of that limb, which begins above the groin crease, read as a scan.
-gives "side=left parameters.girth-calf-mm:number scan.girth_rms_percent<=3" \
+gives "side=left parameters.girth-calf-mm:number scan.girth_rms_percent<=3 scan.thigh_doubtful=true" \
   limb --scan-skin scanned.stl --axes lps --side left --sex male --json
+gives "parameters.thigh-length-mm>=430 scan.thigh_doubtful=false" \
+  limb --scan-skin scanned.stl --axes lps --side left --thigh-length-mm 430 --json
 
 gives "samples:integer samples>=400 normal_max_n:number" identify "$MODEL" --simulate ramp-hold \
   --site 27 --probe point --depth-mm 4 --speed-mm-s 40 --hold-s 0.05 --noise-n 0.05 --noise-mm 0.05 \

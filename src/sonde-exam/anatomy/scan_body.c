@@ -319,8 +319,11 @@ sonde_status sonde_leg_scan_body(const sonde_leg_scan *scan, uint64_t seed, sond
       const section *above = &l->row[k], *below = above + 1;
       const double t = (above->girth_m - half_m) / (above->girth_m - below->girth_m);
       l->calf_m = (ankle_m - above->z_m - t * (below->z_m - above->z_m)) / (ANKLE - HALF_CALF);
-      l->thigh_m = (ankle_m - (ANKLE - 1) * l->calf_m - l->row[0].z_m) / (1 - CREASE);
-      l->hip_m = l->row[0].z_m - CREASE * l->thigh_m;
+      // A length of the thigh that is given says how far the skin reaches above the groin.
+      const double knee_m = ankle_m - (ANKLE - 1) * l->calf_m;
+      l->thigh_m = isnan(body->thigh_length_m) ? (knee_m - l->row[0].z_m) / (1 - CREASE)
+                                               : body->thigh_length_m;
+      l->hip_m = knee_m - l->thigh_m;
     }
     if (!shown && !scan->femur)
       status = sonde_fail(error, SONDE_MESH,
