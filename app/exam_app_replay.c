@@ -17,6 +17,16 @@ static void show(exam_app *app) {
   if (sonde_page_post(app->server, &frame, &controls)) replay->shown_tick = frame.snapshot.tick;
 }
 
+// To a moment of the part; one before its first image shows that image.
+static sonde_status go_to(exam_replay *replay, double time_s, sonde_error *error) {
+  assert(replay->player);
+  sonde_frame frame;
+  sonde_status status = sonde_player_seek(replay->player, time_s, NULL, error);
+  if (!status && !sonde_player_frame(replay->player, &frame))
+    (void)sonde_player_next_image(replay->player, false);
+  return status;
+}
+
 // The player of a part stands before its first tick, its leg is shown.
 static sonde_status play_part(exam_app *app, exam_replay *replay, uint32_t part,
                               sonde_error *error) {
@@ -122,7 +132,7 @@ sonde_status exam_replay_open(exam_app *app, const char *id, sonde_error *error)
   sonde_page_conceal(app->server, false, false);
   exam_app_end_session(app);
   exam_app_change(app, NULL, replay);
-  status = sonde_player_seek(replay->player, 0.5, NULL, error);
+  status = go_to(replay, 0.5, error);
   show(app);
   exam_app_set_phase(app, EXAM_REPLAY, "");
   return status;
@@ -169,8 +179,7 @@ sonde_status exam_replay_seek(exam_app *app, double time_s, sonde_error *error) 
   uint32_t part = 0;
   while (part + 1 < replay->part_count && time_s >= replay->parts[part + 1].start_s) ++part;
   sonde_status status = play_part(app, replay, part, error);
-  if (!status)
-    status = sonde_player_seek(replay->player, time_s - replay->parts[part].start_s, NULL, error);
+  if (!status) status = go_to(replay, time_s - replay->parts[part].start_s, error);
   replay->time_s = exam_replay_time(replay);
   replay->at_s = app_seconds(CLOCK_MONOTONIC);
   show(app);

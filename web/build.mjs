@@ -35,7 +35,7 @@ const page = await bundle("main.ts", "app.js");
 const script = path.join(out, "app.js");
 await writeFile(script, `${await readFile(script, "utf8")}\n${await licences(page.metafile.inputs)}`);
 const plotStyle = `/*! uPlot\n${await read("node_modules/uplot/LICENSE")}*/\n${await read("node_modules/uplot/dist/uPlot.min.css")}`;
-await writeFile(path.join(out, "style.css"), `${await read("style.css")}\n${await read("src/report/worksheet.css")}\n${plotStyle}`);
+await writeFile(path.join(out, "style.css"), `${await read("src/palette.css")}\n${await read("style.css")}\n${await read("src/report/worksheet.css")}\n${plotStyle}`);
 await writeFile(path.join(out, "index.html"), await read("index.html"));
 
 // A report is one file: template, style and script. The marks of title and data stay for the program.

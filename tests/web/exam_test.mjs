@@ -132,7 +132,7 @@ async function replay(page, exam) {
       e.dispatchEvent(new Event("input"));
       e.dispatchEvent(new Event("change"));
     }, share);
-    await until(page, (at) => Math.abs(window.sonde.replay.time_s - at * window.sonde.replay.duration_s) < 0.2, share);
+    await until(page, (at) => Math.abs(window.sonde.replay.time_s - at * window.sonde.replay.duration_s) < 0.3, share);
     await until(page, (n) => window.sonde.frames > n, frames);
     // Another part of the exam has another model, which takes seconds: the image has come when it stays.
     for (let [last, same] = [-1, 0]; ; ) {
@@ -147,6 +147,8 @@ async function replay(page, exam) {
   const elsewhere = await seek(0.2);
   check(there !== elsewhere, "another moment shows another image");
   check((await seek(0.5)) === there, "the same moment shows the same image again");
+  await seek(0); // earlier than the first image of the recording
+  check((await state(page)).snapshot.tick < 400, "before the first image the first one is shown");
   await picture(page, join(out, "real_replay.png"));
   await page.locator("#replay-leave").click();
   await until(page, () => window.sonde.exam.phase === "practice");

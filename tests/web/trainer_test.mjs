@@ -28,11 +28,12 @@ const button = (page, name) => page.getByRole("button", { name, exact: true });
 const exam = (page) => page.evaluate(() => window.sonde.exam);
 const phase = (page, wanted) => page.waitForFunction((p) => window.sonde.exam.phase === p, wanted);
 
-/** Names, contrast and layout of what is on the screen. */
+/** Names, contrast in both themes and layout of what is on the screen. */
 async function inspect(page, state) {
-  for (const [kind, find] of [["names", nameFaults], ["contrast", contrastFaults], ["layout", layoutFaults]]) {
+  for (const [kind, find, colorScheme] of [["names", nameFaults], ["contrast", contrastFaults, "light"], ["contrast", contrastFaults, "dark"], ["layout", layoutFaults]]) {
+    if (colorScheme) await page.emulateMedia({ colorScheme });
     const faults = await page.evaluate(find);
-    check(faults.length === 0, `${state}: ${kind}${faults.slice(0, 5).map((f) => `\n       ${f}`).join("")}`);
+    check(faults.length === 0, `${state}: ${kind}${colorScheme ? `, ${colorScheme} theme` : ""}${faults.slice(0, 5).map((f) => `\n       ${f}`).join("")}`);
   }
 }
 
@@ -177,9 +178,9 @@ async function testKeyboardExam(page) {
   await page.keyboard.press("Enter");
   await page.waitForFunction(() => window.sonde.replay !== null && window.sonde.exam.phase === "replay");
   await page.locator("#scene").focus();
-  await page.keyboard.press("Shift+ArrowRight");
-  await page.waitForFunction(() => window.sonde.replay.time_s > 2);
-  check(true, "keys open and move the replay");
+  await page.locator("#scene").evaluate((e) => [1, 2, 3].forEach(() => e.dispatchEvent(new KeyboardEvent("keydown", { code: "ArrowRight", key: "ArrowRight", bubbles: true }))));
+  await page.waitForFunction(() => Math.abs(window.sonde.replay.time_s - 3) < 0.2);
+  check(true, "keys open and move the replay, each by a second");
   await page.locator("#replay-leave").focus();
   await page.keyboard.press("Enter");
   await phase(page, "practice");
@@ -376,8 +377,13 @@ async function testDuplex(page, mock) {
   await page.mouse.down();
   await page.mouse.move(grip.x + 40, grip.y + 30, { steps: 3 });
   await page.mouse.up();
-  await page.waitForFunction(() => window.sonde.controls.colour_box_mm[0] > -14 + 1);
+  const scale_px = (await page.locator(".pane:not([hidden]) .doppler").first().boundingBox()).height / mock.thigh.controls.depth_mm;
+  const boxAt = (left) => page.waitForFunction((x) => Math.abs(window.sonde.controls.colour_box_mm[0] - x) < 0.02, left);
+  await boxAt(l + 30 / scale_px);
   check(Math.abs(mock.thigh.controls.colour_box_mm[1] - mock.thigh.controls.colour_box_mm[0] - 28) < 1e-3, "a dragged box keeps its size");
+  await page.locator(".pane:not([hidden]) .doppler .grip").first().evaluate((e) => ["ArrowLeft", "ArrowLeft", "ArrowLeft"].forEach((key) => e.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }))));
+  await boxAt(l + 30 / scale_px - 3);
+  check(true, "three quick keys move the box three times");
   await page.locator("#scale-more").click();
   await page.locator("#steer-more").click();
   await page.locator("#gain-less").click();
@@ -404,15 +410,25 @@ async function testPulsed(page, mock) {
   check(await page.evaluate(() => Math.abs(window.sonde.spectrum.mean) > 5 && window.sonde.sounded === 0), "the spectrum scrolls in silence");
   const grip = page.locator(".pane:not([hidden]) .gate .grip").first();
   const box = await grip.boundingBox();
+  const beam = await page.locator(".pane:not([hidden]) .gate").boundingBox();
+  const [along, down] = [40, 30]; // px
+  const gateAt = (x, z) => page.waitForFunction(([u, v]) => Math.hypot(window.sonde.controls.gate_mm[0] - u, window.sonde.controls.gate_mm[1] - v) < 0.02, [x, z]);
+  const scale = beam.height / mock.thigh.controls.depth_mm;
+  const put = [mock.thigh.controls.gate_mm[0] + along / scale, mock.thigh.controls.gate_mm[1] + down / scale];
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.mouse.down();
-  await page.mouse.move(box.x + box.width / 2 + 40, box.y + box.height / 2 + 30, { steps: 3 });
+  await page.mouse.move(box.x + box.width / 2 + along, box.y + box.height / 2 + down, { steps: 3 });
   await page.mouse.up();
-  await page.waitForFunction(() => window.sonde.controls.gate_mm[0] > 1 && window.sonde.controls.gate_mm[1] > 21);
-  const [, depth] = mock.thigh.controls.gate_mm;
-  await grip.focus();
-  await page.keyboard.press("ArrowUp");
-  await page.waitForFunction((d) => Math.abs(window.sonde.controls.gate_mm[1] - d + 0.5) < 0.01, depth);
+  await gateAt(...put);
+  check(true, "a dragged gate comes to where the pointer left it");
+  // Three keys between two images, three clicks between two answers, and back: each counts.
+  await grip.evaluate((e) => ["ArrowUp", "ArrowUp", "ArrowUp"].forEach((key) => e.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }))));
+  await gateAt(put[0], put[1] - 1.5);
+  await page.evaluate(() => ["more", "more", "more", "less"].forEach((way) => document.getElementById(`gate-angle-${way}`).click()));
+  await page.waitForFunction(() => window.sonde.controls.gate_angle_deg === 64);
+  await page.evaluate(() => ["less", "less"].forEach((way) => document.getElementById(`gate-angle-${way}`).click()));
+  await page.waitForFunction(() => window.sonde.controls.gate_angle_deg === 60);
+  check(true, "keys that come quicker than images move the gate once each");
   await page.locator("#gate-beam-more").click();
   await page.locator("#gate-filter-less").click();
   await page.waitForFunction(() => window.sonde.controls.gate_filter_hz === 20);

@@ -4,6 +4,7 @@ import { clientId, isStranger, takeToken, token } from "./access";
 import {
   decode,
   type ColourWish,
+  type Controls,
   type Decision,
   type Frame,
   type GateWish,
@@ -16,6 +17,7 @@ import {
   type TextMessage,
   type Vec3,
 } from "./protocol";
+import { Wishes } from "./wish";
 
 export interface ConnectionEvents {
   text(message: TextMessage): void;
@@ -39,6 +41,8 @@ export interface ExamWish {
 export class Connection {
   /** smoothed round trip of a ping, ms */
   latency_ms = NaN;
+  /** the scanner's controls: those asked for over those told */
+  readonly wishes = new Wishes<Controls>();
   private socket: WebSocket | null = null;
   private retry = 0;
   private pingId = 0;
@@ -60,25 +64,25 @@ export class Connection {
     this.send({ type: "controls", probe });
   }
   pathology(name: string): void {
-    this.send({ type: "controls", case: name });
+    this.send({ type: "controls", ...this.wishes.ask({ case: name }) });
   }
   set(key: EchoKey | TissueKey, value: number): void {
     this.send({ type: "controls", [key]: value });
   }
   posture(posture: Posture): void {
-    this.send({ type: "controls", posture });
+    this.send({ type: "controls", ...this.wishes.ask({ posture }) });
   }
   valsalva(valsalva: boolean): void {
-    this.send({ type: "controls", valsalva });
+    this.send({ type: "controls", ...this.wishes.ask({ valsalva }) });
   }
   gel(action: "put" | "wipe"): void {
     this.send({ type: "gel", action });
   }
   colour(wish: ColourWish): void {
-    this.send({ type: "controls", ...wish });
+    this.send({ type: "controls", ...this.wishes.ask(wish) });
   }
   gate(wish: GateWish): void {
-    this.send({ type: "controls", ...wish });
+    this.send({ type: "controls", ...this.wishes.ask(wish) });
   }
   hand(action: "squeeze" | "breathe"): void {
     this.send({ type: "hand", action });
@@ -163,6 +167,7 @@ export class Connection {
     socket.onopen = () => {
       greeted = true;
       this.retry = 0;
+      this.wishes.forget();
       this.events.state(true, 0);
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
@@ -182,6 +187,7 @@ export class Connection {
   private receive(data: string | ArrayBuffer): void {
     if (typeof data === "string") {
       const message = JSON.parse(data) as TextMessage;
+      if (message.type === "controls") this.wishes.tell(message);
       if (message.type !== "pong") this.events.text(message);
       else if (message.id === this.pingId) this.measure(performance.now() - this.pingSent);
       return;

@@ -3,6 +3,7 @@
 import type { Connection } from "./connection";
 import { announce, beside, draw, find, make, press, pressed, stepper } from "./dom";
 import type { ColourFrame, ColourShown, Controls } from "./protocol";
+import { Wishes } from "./wish";
 
 const SCALES_CM_S = [1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 40, 60, 100];
 const STEER_DEG = [0, 20, -20];
@@ -56,7 +57,7 @@ export class DopplerBox {
   moved: (box: Box, last: boolean) => void = () => undefined;
   enabled = true;
   private colour: ColourFrame | null = null;
-  private wanted: Box | null = null; // while it is dragged
+  private readonly wishes = new Wishes<{ box: Box }>(); // over the box that the images tell
   private scale = 1;
   private size_mm: [number, number] = [1, 1];
   private drag: { x: number; y: number; box: Box; corner: boolean } | null = null;
@@ -80,6 +81,7 @@ export class DopplerBox {
 
   show(colour: ColourFrame | null): void {
     this.colour = colour;
+    if (colour) this.wishes.tell({ box: colour.box_mm });
     this.svg.style.display = colour ? "" : "none";
     if (colour) this.paint(colour);
   }
@@ -92,7 +94,7 @@ export class DopplerBox {
   }
 
   private paint(colour: ColourFrame): void {
-    const [left, right, top, bottom] = this.wanted ?? colour.box_mm;
+    const [left, right, top, bottom] = this.wishes.get("box") ?? colour.box_mm;
     const lean = Math.tan((colour.steer_deg * Math.PI) / 180);
     const at = (x: number, z: number): string => `${((x + z * lean + this.size_mm[0] / 2) * this.scale).toFixed(1)} ${(z * this.scale).toFixed(1)}`;
     const shape = `M${at(left, top)} L${at(right, top)} L${at(right, bottom)} L${at(left, bottom)} Z`;
@@ -123,7 +125,7 @@ export class DopplerBox {
 
   private down(e: PointerEvent, corner: boolean): void {
     if (!this.colour || !this.enabled) return;
-    this.drag = { x: e.clientX, y: e.clientY, box: [...this.colour.box_mm], corner };
+    this.drag = { x: e.clientX, y: e.clientY, box: [...this.box_mm], corner };
     (e.target as Element).setPointerCapture(e.pointerId);
     e.preventDefault();
   }
@@ -133,17 +135,20 @@ export class DopplerBox {
   }
 
   private end(): void {
+    if (this.drag) this.moved(this.box_mm, true);
     this.drag = null;
-    if (this.wanted) this.moved(this.wanted, true);
-    this.wanted = null;
+  }
+
+  private get box_mm(): Box {
+    return this.wishes.get("box") ?? this.colour!.box_mm;
   }
 
   private key(e: KeyboardEvent): void {
     const step: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     const way = step[e.key];
     if (!way || !this.colour || !this.enabled) return;
-    this.put(this.colour.box_mm, way[0], way[1], e.shiftKey);
-    this.end();
+    this.put(this.box_mm, way[0], way[1], e.shiftKey);
+    this.moved(this.box_mm, true);
     e.preventDefault();
     e.stopPropagation();
   }
@@ -160,8 +165,8 @@ export class DopplerBox {
       y = Math.max(-top, Math.min(deep - bottom, y));
       [left, right, top, bottom] = [left + x, right + x, top + y, bottom + y];
     }
-    this.wanted = [left, right, top, bottom];
-    this.moved(this.wanted, false);
+    this.wishes.ask({ box: [left, right, top, bottom] });
+    this.moved([left, right, top, bottom], false);
     if (this.colour) this.paint(this.colour);
   }
 }
@@ -225,7 +230,7 @@ export class Duplex {
   }
 
   private get shown(): ColourShown {
-    return this.controls?.colour ?? "off";
+    return this.connection.wishes.get("colour") ?? "off";
   }
 
   /** How much moves instead of how fast, and back. */
@@ -234,17 +239,17 @@ export class Duplex {
   }
 
   private scale(way: number): void {
-    const now = this.controls?.colour_scale_cm_s ?? 6;
+    const now = this.connection.wishes.get("colour_scale_cm_s") ?? 6;
     this.connection.colour({ colour_scale_cm_s: beside(SCALES_CM_S, now, way) });
   }
 
   private gain(way: number): void {
-    const wanted = (this.controls?.colour_gain_db ?? 0) + way * GAIN_DB.step;
+    const wanted = (this.connection.wishes.get("colour_gain_db") ?? 0) + way * GAIN_DB.step;
     this.connection.colour({ colour_gain_db: Math.max(GAIN_DB.low, Math.min(GAIN_DB.high, wanted)) });
   }
 
   private steer(way: number): void {
-    const at = STEER_DEG.indexOf(Math.round(this.controls?.colour_steer_deg ?? 0));
+    const at = STEER_DEG.indexOf(Math.round(this.connection.wishes.get("colour_steer_deg") ?? 0));
     this.connection.colour({ colour_steer_deg: STEER_DEG[(at + way + STEER_DEG.length) % STEER_DEG.length]! });
   }
 

@@ -7,6 +7,7 @@ import { DopplerBox, paintColour } from "./duplex";
 import { GateOverlay } from "./gate";
 import { PictureGuide } from "./guide";
 import type { Controls, Frame, Picture } from "./protocol";
+import { ink } from "./theme";
 
 const RULER_PX = 40;
 const CURVE_PX = 26; // gain over depth, left of the image
@@ -15,7 +16,6 @@ const GAP_PX = 14;
 const TOP_PX = 16;
 const NARROW_PX = 480;
 const FULL_DB = 30; // at the edge of the gain curve
-const INK = { scale: "#98a5b5", focus: "#e6b450", mark: "#5cc8c2" };
 
 function context(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   const c = canvas.getContext("2d");
@@ -263,7 +263,7 @@ export class EchoView {
     c.clearRect(0, 0, this.overlay.width, this.overlay.height);
     c.font = "11.5px system-ui, sans-serif";
     c.textBaseline = "middle";
-    c.strokeStyle = c.fillStyle = INK.scale;
+    c.strokeStyle = c.fillStyle = ink("muted", "picture");
     c.lineWidth = 1;
     c.beginPath();
     for (let mm = 0; mm <= height_mm + 0.01; mm += 5) {
@@ -276,7 +276,7 @@ export class EchoView {
     c.fillText("cm", right + 14, TOP_PX + 1);
     this.drawFocus(right, scale);
     if (curve) this.drawGain(left, scale);
-    c.fillStyle = INK.mark; // the side of the probe's own mark
+    c.fillStyle = ink("accent", "picture"); // the side of the probe's own mark
     c.beginPath();
     c.arc(left + 5, TOP_PX - 7, 3.5, 0, 2 * Math.PI);
     c.fill();
@@ -287,7 +287,7 @@ export class EchoView {
     if (!(focus_mm < this.live.height_mm)) return;
     const y = TOP_PX + focus_mm * scale;
     const c = this.marks;
-    c.fillStyle = INK.focus;
+    c.fillStyle = ink("focus");
     c.beginPath();
     c.moveTo(right + 2, y);
     c.lineTo(right + 10, y - 5);
@@ -303,19 +303,19 @@ export class EchoView {
     const middle = left - CURVE_PX / 2 - 4;
     const bottom = TOP_PX + this.live.height_mm * scale;
     const db = Math.max(-FULL_DB, Math.min(FULL_DB, (slope * this.live.height_mm) / 10));
-    c.strokeStyle = "#2c3643";
+    c.strokeStyle = ink("image-rule");
     c.beginPath();
     c.moveTo(middle, TOP_PX);
     c.lineTo(middle, bottom);
     c.stroke();
-    c.strokeStyle = INK.mark;
+    c.strokeStyle = ink("accent", "picture");
     c.globalAlpha = 0.8;
     c.beginPath();
     c.moveTo(middle, TOP_PX);
     c.lineTo(middle + (db / FULL_DB) * (CURVE_PX / 2), bottom);
     c.stroke();
     c.globalAlpha = 1;
-    c.fillStyle = INK.scale;
+    c.fillStyle = ink("muted", "picture");
     c.textAlign = "center";
     c.fillText("TGC", middle, TOP_PX - 7);
     c.textAlign = "left";

@@ -4,6 +4,7 @@
 import * as THREE from "three";
 import { shade } from "./colour";
 import type { ProbeInfo, Site, Target, Vec3 } from "./protocol";
+import { ink } from "./theme";
 
 const LIGHTS = 10; // steps of brightness
 const SHADES = 8; // steps of displacement
@@ -11,7 +12,6 @@ const HANDLE_MM = 46;
 const RING_POINTS = 40;
 const EVERY_MS = 50; // a processor that draws has other work too
 const LIGHT = new THREE.Vector3(0.45, 0.8, -0.4).normalize();
-const INK = { vein: "#5b8def", artery: "#e0604d", bone: "#e7dfcb", probe: "#d3dae2", edge: "#f4f7fa", mark: "#5cc8c2", site: "#c9d4e2", wanted: "#ffc857", reached: "#5fd38d" };
 
 export interface FlatVessel {
   /** x, y, z, radius */
@@ -126,7 +126,7 @@ export class FlatView {
     const c = this.c;
     const [a, b] = [middle[0]!, middle[middle.length - 1]!];
     const length_mm = Math.hypot(points[points.length - 4]! - points[0]!, points[points.length - 3]! - points[1]!, points[points.length - 2]! - points[2]!);
-    c.strokeStyle = vein ? INK.vein : INK.artery;
+    c.strokeStyle = vein ? ink("leg-vein") : ink("leg-artery");
     c.globalAlpha = 0.85;
     c.lineCap = c.lineJoin = "round";
     c.lineWidth = Math.max(2, (2 * radius_mm * Math.hypot(b[0] - a[0], b[1] - a[1])) / Math.max(1, length_mm));
@@ -138,7 +138,7 @@ export class FlatView {
   /** Sites on the side that the camera sees. */
   private sites(scene: FlatScene): void {
     const eye = scene.camera.position;
-    this.c.fillStyle = INK.site;
+    this.c.fillStyle = ink("leg-site");
     for (const { position_mm: p, normal: n } of scene.sites) {
       if ((eye.x - p[0]) * n[0] + (eye.y - p[1]) * n[1] + (eye.z - p[2]) * n[2] <= 0) continue;
       const [x, y] = this.project(...p);
@@ -158,7 +158,7 @@ export class FlatView {
       const p = new THREE.Vector3(...target.position_mm).addScaledVector(x, u).addScaledVector(y, v);
       return this.project(p.x, p.y, p.z);
     };
-    this.c.strokeStyle = reached ? INK.reached : INK.wanted;
+    this.c.strokeStyle = reached ? ink("leg-reached") : ink("leg-wanted");
     this.c.lineWidth = 3;
     this.line(Array.from({ length: RING_POINTS }, (_, i) => at(r * Math.cos((2 * Math.PI * i) / RING_POINTS), r * Math.sin((2 * Math.PI * i) / RING_POINTS))), true);
     this.c.stroke();
@@ -180,14 +180,14 @@ export class FlatView {
     if (image_mm) {
       const [w, h] = [image_mm[0] / 2, image_mm[1]];
       this.line([at(-w, 0, 0), at(w, 0, 0), at(w, 0, h), at(-w, 0, h)], true);
-      c.fillStyle = "#ffffff18";
-      c.strokeStyle = INK.mark;
+      c.fillStyle = ink("leg-plane");
+      c.strokeStyle = ink("leg-mark");
       c.lineWidth = 1;
       c.fill();
       c.stroke();
     }
-    c.fillStyle = INK.probe;
-    c.strokeStyle = INK.edge;
+    c.fillStyle = ink("leg-probe");
+    c.strokeStyle = ink("leg-probe-edge");
     c.lineWidth = 1;
     for (let i = 0; i < 4; ++i) {
       const k = (i + 1) % 4;
@@ -202,7 +202,7 @@ export class FlatView {
     c.lineWidth = 2;
     c.stroke();
     const [mx, my] = at(-hx, 0, 0); // the image's left side
-    c.fillStyle = INK.mark;
+    c.fillStyle = ink("leg-mark");
     c.beginPath();
     c.arc(mx, my, 4.5, 0, 2 * Math.PI);
     c.fill();

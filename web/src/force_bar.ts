@@ -4,15 +4,13 @@
 import { find, make } from "./dom";
 import { feedback, type Feedback } from "./feedback";
 import type { Compression, Snapshot } from "./protocol";
+import { ink, onTheme } from "./theme";
 
 const TOP_PX = 10;
 const FOOT_PX = 8;
 const BAR = { left: 34, width: 22 };
 const OVER = 1.1; // the scale ends above the limit
 const RENDERED_N = 0.3; // smaller differences between true and rendered force are not shown
-const INK = {
-  comfort: "#2f7f6f", firm: "#96742c", hard: "#8e3a3d", fill: "#e9f1f8", text: "#98a5b5", corridor: "#5cc8c2", notch: "#c7a6ff",
-};
 
 export class ForceBar {
   private limit_n = 40;
@@ -26,10 +24,12 @@ export class ForceBar {
 
   constructor() {
     this.c = this.canvas.getContext("2d")!;
-    new ResizeObserver(() => {
+    const again = (): void => {
       this.drawn = "";
       this.paint();
-    }).observe(this.canvas);
+    };
+    new ResizeObserver(again).observe(this.canvas);
+    onTheme(again);
   }
 
   limits(limit_n: number, comfort_n: number): void {
@@ -98,9 +98,9 @@ export class ForceBar {
 
   private zones(y: (n: number) => number): void {
     this.c.globalAlpha = 0.55;
-    this.block(y, 0, this.comfort_n, INK.comfort);
-    this.block(y, this.comfort_n, this.limit_n, INK.firm);
-    this.block(y, this.limit_n, OVER * this.limit_n, INK.hard);
+    this.block(y, 0, this.comfort_n, ink("force-comfort"));
+    this.block(y, this.comfort_n, this.limit_n, ink("force-firm"));
+    this.block(y, this.limit_n, OVER * this.limit_n, ink("force-hard"));
     this.c.globalAlpha = 1;
   }
 
@@ -109,7 +109,7 @@ export class ForceBar {
     c.font = "11px system-ui, sans-serif";
     c.textBaseline = "middle";
     c.textAlign = "right";
-    c.fillStyle = INK.text;
+    c.fillStyle = ink("muted");
     for (let n = 0; n <= this.limit_n; n += 10) {
       c.fillText(`${n}`, BAR.left - 9, y(n));
       c.fillRect(BAR.left - 5, Math.round(y(n)), 4, 1);
@@ -117,19 +117,19 @@ export class ForceBar {
   }
 
   private level(y: (n: number) => number): void {
-    this.block(y, 0, this.force_n, INK.fill, BAR.left + 6, BAR.width - 12);
+    this.block(y, 0, this.force_n, ink("force-fill"), BAR.left + 6, BAR.width - 12);
     if (Math.abs(this.rendered_n - this.force_n) < RENDERED_N || this.rendered_n === 0) return;
-    this.c.fillStyle = INK.notch; // what the device renders
+    this.c.fillStyle = ink("force-notch"); // what the device renders
     this.c.fillRect(BAR.left, y(this.rendered_n) - 1.5, BAR.width, 3);
   }
 
   private bracket(y: (n: number) => number, [low, high]: [number, number]): void {
     const c = this.c;
     const right = BAR.left + BAR.width + 3;
-    c.strokeStyle = INK.corridor;
+    c.strokeStyle = ink("accent");
     c.lineWidth = 2;
     c.strokeRect(BAR.left - 1.5, y(high), BAR.width + 3, y(low) - y(high));
-    c.fillStyle = INK.corridor;
+    c.fillStyle = ink("accent");
     c.beginPath();
     c.moveTo(right + 1, (y(low) + y(high)) / 2);
     c.lineTo(right + 9, (y(low) + y(high)) / 2 - 5);

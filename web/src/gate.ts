@@ -4,6 +4,7 @@ import type { Connection } from "./connection";
 import { beside, draw, find, make, press, pressed, stepper } from "./dom";
 import type { Controls, GateKey, SpectrumFrame } from "./protocol";
 import type { DopplerSound } from "./sound";
+import { Wishes } from "./wish";
 
 const STEP_MM = 0.5;
 const FAST_MM = 2;
@@ -27,7 +28,7 @@ export class GateOverlay {
   turned: (angle_deg: number) => void = () => undefined;
   enabled = true;
   private gate: SpectrumFrame | null = null;
-  private wanted: [number, number] | null = null; // while it is dragged
+  private readonly wishes = new Wishes<{ at: [number, number]; angle_deg: number }>(); // over the gate that the images tell
   private scale = 1;
   private size_mm: [number, number] = [1, 1];
   private drag: { x: number; y: number; at: [number, number] } | null = null;
@@ -57,6 +58,7 @@ export class GateOverlay {
 
   show(gate: SpectrumFrame | null): void {
     this.gate = gate;
+    if (gate) this.wishes.tell({ at: [gate.x_mm, gate.z_mm], angle_deg: gate.angle_deg });
     this.svg.style.display = gate ? "" : "none";
     if (gate) this.paint(gate);
   }
@@ -76,7 +78,7 @@ export class GateOverlay {
   }
 
   private paint(gate: SpectrumFrame): void {
-    const [x, z] = this.wanted ?? [gate.x_mm, gate.z_mm];
+    const [x, z] = this.at;
     const lean = (gate.steer_deg * Math.PI) / 180;
     const flow = lean + (gate.angle_deg * Math.PI) / 180;
     const px = (across: number, depth: number): [number, number] => [(across + this.size_mm[0] / 2) * this.scale, depth * this.scale];
@@ -104,25 +106,28 @@ export class GateOverlay {
 
   private down(e: PointerEvent): void {
     if (!this.gate || !this.enabled) return;
-    this.drag = { x: e.clientX, y: e.clientY, at: [this.gate.x_mm, this.gate.z_mm] };
+    this.drag = { x: e.clientX, y: e.clientY, at: this.at };
     this.body.setPointerCapture(e.pointerId);
     e.preventDefault();
   }
 
   private move(e: PointerEvent): void {
-    if (this.drag) this.put(this.drag.at[0] + (e.clientX - this.drag.x) / this.scale, this.drag.at[1] + (e.clientY - this.drag.y) / this.scale);
+    if (this.drag) this.put(this.drag.at[0] + (e.clientX - this.drag.x) / this.scale, this.drag.at[1] + (e.clientY - this.drag.y) / this.scale, false);
   }
 
   private drop(): void {
+    if (this.drag) this.moved(this.at, true);
     this.drag = null;
-    if (this.wanted) this.moved(this.wanted, true);
-    this.wanted = null;
   }
 
-  private put(x: number, z: number): void {
+  private get at(): [number, number] {
+    return this.wishes.get("at") ?? [this.gate!.x_mm, this.gate!.z_mm];
+  }
+
+  private put(x: number, z: number, last: boolean): void {
     const half = this.size_mm[0] / 2;
-    this.wanted = [Math.max(-half, Math.min(half, x)), Math.max(1, Math.min(this.size_mm[1] - 1, z))];
-    this.moved(this.wanted, false);
+    this.wishes.ask({ at: [Math.max(-half, Math.min(half, x)), Math.max(1, Math.min(this.size_mm[1] - 1, z))] });
+    this.moved(this.at, last);
     if (this.gate) this.paint(this.gate);
   }
 
@@ -131,8 +136,8 @@ export class GateOverlay {
     const way = step[e.key];
     if (!way || !this.gate || !this.enabled) return;
     const far = e.shiftKey ? FAST_MM : STEP_MM;
-    this.put(this.gate.x_mm + way[0] * far, this.gate.z_mm + way[1] * far);
-    this.drop();
+    const [x, z] = this.at;
+    this.put(x + way[0] * far, z + way[1] * far, true);
     e.preventDefault();
     e.stopPropagation();
   }
@@ -140,8 +145,8 @@ export class GateOverlay {
   private turn(e: PointerEvent): void {
     if (!this.gate) return;
     const at = this.svg.getBoundingClientRect();
-    const x = (e.clientX - at.left) / this.scale - this.size_mm[0] / 2 - this.gate.x_mm;
-    const z = (e.clientY - at.top) / this.scale - this.gate.z_mm;
+    const x = (e.clientX - at.left) / this.scale - this.size_mm[0] / 2 - this.at[0];
+    const z = (e.clientY - at.top) / this.scale - this.at[1];
     let angle = (Math.atan2(x, z) * 180) / Math.PI - this.gate.steer_deg;
     if (angle > 90) angle -= 180;
     if (angle < -90) angle += 180;
@@ -151,7 +156,9 @@ export class GateOverlay {
   private turnByKey(e: KeyboardEvent): void {
     const way = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
     if (!way || !this.gate || !this.enabled) return;
-    this.turned(Math.max(-80, Math.min(80, Math.round(this.gate.angle_deg) + way * (e.shiftKey ? 10 : 2))));
+    const now = this.wishes.get("angle_deg") ?? this.gate.angle_deg;
+    const wanted = Math.max(-80, Math.min(80, Math.round(now) + way * (e.shiftKey ? 10 : 2)));
+    this.turned(this.wishes.ask({ angle_deg: wanted }).angle_deg);
     e.preventDefault();
     e.stopPropagation();
   }
@@ -222,7 +229,7 @@ export class GateTools {
   }
 
   private toggle(): void {
-    this.connection.gate({ gate: !this.controls?.gate });
+    this.connection.gate({ gate: !this.connection.wishes.get("gate") });
   }
 
   private hear(on: boolean): void {
@@ -232,6 +239,6 @@ export class GateTools {
   }
 
   private step(key: GateKey, way: number): void {
-    this.connection.gate({ [key]: beside(STEPS[key], this.controls?.[key] ?? 0, way) });
+    this.connection.gate({ [key]: beside(STEPS[key], this.connection.wishes.get(key) ?? 0, way) });
   }
 }

@@ -3,8 +3,8 @@
 
 import * as THREE from "three";
 import type { LimbInfo } from "./protocol";
+import { SOLID } from "./theme";
 
-const SKIN = 0x9fb0c2;
 const POINTS = 28; // round a section
 const ANKLE_MM = 36; // radius of the ankle that the sections are of
 const RELAXED_RAD = 0.44; // a foot that carries nothing points downwards by this much
@@ -51,7 +51,7 @@ function footGeometry(limb: LimbInfo): THREE.BufferGeometry {
 
 export class Foot {
   readonly group = new THREE.Group();
-  private readonly material = new THREE.MeshStandardMaterial({ color: SKIN, roughness: 0.85, transparent: true, opacity: 0.5, side: THREE.DoubleSide });
+  private readonly material = new THREE.MeshStandardMaterial({ color: SOLID.skin, roughness: 0.85, transparent: true, opacity: 0.5, side: THREE.DoubleSide });
 
   place(limb: LimbInfo | null): void {
     this.group.clear();

@@ -28,6 +28,7 @@ import { DopplerSound } from "./sound";
 import { SpectrumView } from "./spectrum";
 import { StartDialog } from "./start";
 import { EchoTools } from "./tools";
+import { startTheme } from "./theme";
 import { Traces } from "./traces";
 import { letGo, ROLE_ACTIONS, roleWords } from "./words";
 import { Worksheet, type SheetMessage } from "./worksheet";
@@ -150,6 +151,7 @@ class App {
     this.history = new HistoryDialog((exam) => connection.openReplay(exam));
     this.input = this.wireInput();
     this.wireButtons();
+    startTheme();
     const loop = (now: number): void => {
       requestAnimationFrame(loop); // first: whatever goes wrong in one picture, the next one comes
       this.animate(now / 1000);
@@ -543,7 +545,7 @@ class App {
 
   private nextCase(): void {
     const cases = this.hello?.cases ?? [];
-    const next = cases[(cases.indexOf(this.controls?.case ?? "") + 1) % cases.length];
+    const next = cases[(cases.indexOf(this.connection.wishes.get("case") ?? "") + 1) % cases.length];
     if (next && this.phase === "practice") this.connection.pathology(next);
   }
 

@@ -2,10 +2,10 @@
 
 import uPlot from "uplot";
 import { nameDrawing } from "./dom";
+import { ink, onTheme } from "./theme";
 
 const TRACE_POINTS = 900;
 const MOST = { mm: 50, n: 60 }; // a point beyond stays at the edge
-const INK = { grid: "#1c232d", axis: "#8491a1", measured: "#8fa0b5", live: "#5cc8c2" };
 
 export interface Curve {
   penetration_mm: number[];
@@ -22,6 +22,7 @@ export class ForcePlot {
     this.plot = new uPlot(this.options(), [[0], [0]], box);
     nameDrawing(box, "Force in newtons against how far the probe is pressed in, in millimetres: now, and as computed beforehand");
     new ResizeObserver(() => this.resize()).observe(box);
+    onTheme(() => this.plot.redraw());
     this.resize();
   }
 
@@ -31,7 +32,7 @@ export class ForcePlot {
 
   private options(): uPlot.Options {
     const font = "11px system-ui, sans-serif";
-    const axis = { stroke: INK.axis, font, labelFont: font, grid: { stroke: INK.grid, width: 1 }, ticks: { show: false } };
+    const axis = { stroke: () => ink("muted"), font, labelFont: font, grid: { stroke: () => ink("grid"), width: 1 }, ticks: { show: false } };
     return {
       width: 300,
       height: 150,
@@ -49,10 +50,10 @@ export class ForcePlot {
       series: [
         {},
         {
-          stroke: INK.measured,
+          stroke: () => ink("measured"),
           width: 1.25,
           dash: [3, 4],
-          points: { show: true, size: 5, width: 0, fill: INK.measured },
+          points: { show: true, size: 5, width: 0, fill: () => ink("measured") },
         },
       ],
       hooks: { draw: [(u) => this.drawTrace(u)] },
@@ -69,7 +70,7 @@ export class ForcePlot {
     c.beginPath();
     c.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     c.clip();
-    c.strokeStyle = INK.live;
+    c.strokeStyle = ink("accent");
     c.lineWidth = 2 * devicePixelRatio;
     c.lineJoin = "round";
     const chunk = 60; // older pieces are fainter
@@ -81,7 +82,7 @@ export class ForcePlot {
       c.stroke();
     }
     c.restore();
-    c.fillStyle = "#ffffff";
+    c.fillStyle = ink("bright");
     c.beginPath();
     c.arc(Math.max(u.bbox.left, x(last)), Math.max(u.bbox.top, y(last)), 4.5 * devicePixelRatio, 0, 2 * Math.PI);
     c.fill();

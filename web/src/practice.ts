@@ -89,7 +89,7 @@ export class PatientTools {
       this.connection.position(all[(all.findIndex((o) => o.value === this.position.value) + 1) % all.length]!.value);
       return true;
     }
-    if (code === "KeyP" && c.posture) this.connection.posture(POSTURES[(POSTURES.indexOf(c.posture) + 1) % 3]!);
+    if (code === "KeyP" && c.posture) this.connection.posture(POSTURES[(POSTURES.indexOf(this.connection.wishes.get("posture") ?? c.posture) + 1) % 3]!);
     else if (code === "KeyV" && c.valsalva !== undefined) this.strain();
     else if (code === "KeyZ" && c.gel) this.connection.gel(shift ? "wipe" : "put");
     else return false;
@@ -97,7 +97,7 @@ export class PatientTools {
   }
 
   private strain(): void {
-    this.connection.valsalva(!(this.controls?.valsalva ?? false));
+    this.connection.valsalva(!(this.connection.wishes.get("valsalva") ?? false));
   }
 
   // ---- tissue ----------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import { announce, button, draw, find, make, minutes, press, recall, release, remember } from "./dom";
 import type { Comment, Exam, Press, PressResult, Replay } from "./protocol";
+import { Wishes } from "./wish";
 import { PRESS_WORDS } from "./words";
 
 const SEEK_MS = 80; // while the slider is dragged
@@ -16,6 +17,7 @@ export interface ReplayActions {
 export class ReplayBar {
   private replay: Replay | null = null;
   private exam: Exam | null = null; // that runs and may be commented on
+  private readonly wishes = new Wishes<{ time_s: number }>();
   private held = false; // the slider is in the hand
   private sent_ms = 0;
   private marksKey = "";
@@ -53,6 +55,7 @@ export class ReplayBar {
 
   show(replay: Replay, controls: boolean): void {
     this.replay = replay;
+    this.wishes.tell({ time_s: replay.time_s });
     this.exam = null;
     find("replay-title").textContent = replay.title;
     this.scrub.max = String(replay.duration_s);
@@ -87,15 +90,18 @@ export class ReplayBar {
     const r = this.replay;
     if (!r) return false;
     const by = shift ? 5 : 1;
+    const now_s = this.wishes.get("time_s") ?? r.time_s;
+    const go = (time_s: number): void => this.actions.seek(this.wishes.ask({ time_s: Math.max(0, Math.min(r.duration_s, time_s)) }).time_s);
     if (code === "Space") this.toggle();
-    else if (code === "ArrowLeft") this.actions.seek(Math.max(0, r.time_s - by));
-    else if (code === "ArrowRight") this.actions.seek(Math.min(r.duration_s, r.time_s + by));
+    else if (code === "ArrowLeft") go(now_s - by);
+    else if (code === "ArrowRight") go(now_s + by);
     else return false;
     return true;
   }
 
   leave(): void {
     this.replay = null;
+    this.wishes.forget();
     this.marksKey = "";
   }
 

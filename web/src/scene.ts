@@ -13,8 +13,8 @@ import { Skin } from "./pose";
 import { Sides } from "./sides";
 import { TargetMark } from "./target";
 import { PART, type Frame, type LimbInfo, type Line, type Mesh, type ProbeInfo, type Quat, type Site, type Target, type Vec3 } from "./protocol";
+import { onTheme, paint, repaint, SOLID } from "./theme";
 
-const COLOUR = { vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2 };
 // Between two pictures of the leg with low quality: while skin or probe move, and while only the echo image changes.
 const LOW_INTERVAL_S = 1 / 8;
 const LOW_STILL_INTERVAL_S = 1;
@@ -56,7 +56,7 @@ function skinMaterial(): THREE.MeshStandardMaterial {
 
 /** The two cut ends of the thigh: flat, calm, not part of the skin. */
 function endMaterial(): THREE.MeshBasicMaterial {
-  return new THREE.MeshBasicMaterial({ color: 0x2b333e, transparent: true, opacity: 0.5, depthWrite: false });
+  return paint(new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false }), "cut");
 }
 
 /** Splits the faces into the skin and the flat ends across the leg (z is the leg's axis). */
@@ -142,7 +142,7 @@ export class LegScene {
   ) {
     this.ring = new THREE.Mesh(
       new THREE.RingGeometry(4.2, 5, 40),
-      new THREE.MeshBasicMaterial({ color: COLOUR.mark, transparent: true, opacity: 0.8, side: THREE.DoubleSide, depthTest: false }),
+      paint(new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.8, side: THREE.DoubleSide, depthTest: false }), "mark"),
     );
     this.ring.visible = false;
     this.ring.renderOrder = 5;
@@ -163,18 +163,26 @@ export class LegScene {
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
     this.seeThrough(true);
+    onTheme(() => this.repaint());
     // three.js restores its own state; until then the plain view takes its place.
     canvas.addEventListener("webglcontextlost", (e) => (e.preventDefault(), this.setFlat(true)));
     canvas.addEventListener("webglcontextrestored", () => this.setFlat(false));
   }
 
   private addLights(): void {
-    this.lights.add(new THREE.HemisphereLight(0xdfe8f5, 0x3a3632, 1.7));
-    const key = new THREE.DirectionalLight(0xfff3e4, 2.4);
+    this.lights.add(new THREE.HemisphereLight(SOLID.sky, SOLID.floor, 1.7));
+    const key = new THREE.DirectionalLight(SOLID.key, 2.4);
     key.position.set(260, 420, -160);
-    const rim = new THREE.DirectionalLight(0x86a8d8, 0.9);
+    const rim = new THREE.DirectionalLight(SOLID.rim, 0.9);
     rim.position.set(-300, 120, 300);
     this.lights.add(key, rim);
+  }
+
+  /** In the colours of the present theme. */
+  private repaint(): void {
+    this.scene.traverse((thing) => repaint((thing as THREE.Mesh).material));
+    if (this.skin) this.sides.place(this.skin.points);
+    this.dirty = true;
   }
 
   private configureOrbit(): void {
@@ -317,7 +325,7 @@ export class LegScene {
   }
 
   private setFemur(mesh: Mesh): void {
-    const material = new THREE.MeshStandardMaterial({ color: COLOUR.bone, roughness: 0.9 });
+    const material = new THREE.MeshStandardMaterial({ color: SOLID.bone, roughness: 0.9 });
     this.replaceInside("femur", new THREE.Mesh(toCreasedNormals(LegScene.geometry(mesh), CREASE_RAD), material));
   }
 
@@ -334,7 +342,7 @@ export class LegScene {
     const branch = line.part >= PART.branch;
     this.vessels.set(line.part, { points: line.points.slice(), vein });
     const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), branch ? 24 : 96, radius / points.length, branch ? 6 : 16);
-    const colour = vein ? COLOUR.vein : COLOUR.artery;
+    const colour = vein ? SOLID.vein : SOLID.artery;
     const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.55, emissive: colour, emissiveIntensity: 0.25 });
     this.replaceInside(`vessel ${line.part}`, new THREE.Mesh(tube, material));
   }
@@ -344,11 +352,11 @@ export class LegScene {
     for (let i = 2; i < points.length; i += 3) points[i] = Math.max(points[i]!, -BEHIND_MM);
     const g = toCreasedNormals(LegScene.geometry({ ...mesh, points }), CREASE_RAD);
     const round = mesh.faces.length > 3 * 60;
-    const material = new THREE.MeshStandardMaterial({ color: COLOUR.probe, roughness: 0.5, transparent: true, opacity: 0.5 });
+    const material = paint(new THREE.MeshStandardMaterial({ roughness: 0.5, transparent: true, opacity: 0.5 }), "probe");
     const body = new THREE.Mesh(g, material);
     body.renderOrder = 3;
     if (!round) {
-      const edge = new THREE.LineBasicMaterial({ color: 0xffffff, transparent: true, opacity: 0.5 });
+      const edge = paint(new THREE.LineBasicMaterial({ transparent: true, opacity: 0.5 }), "edge");
       body.add(new THREE.LineSegments(new THREE.EdgesGeometry(g, 20), edge));
     }
     body.visible = false;
@@ -361,7 +369,7 @@ export class LegScene {
   setProbes(probes: readonly ProbeInfo[]): void {
     this.probes = probes;
     probes.forEach((info, i) => {
-      const mark = new THREE.Mesh(new THREE.SphereGeometry(1.6, 16, 12), new THREE.MeshBasicMaterial({ color: COLOUR.mark }));
+      const mark = new THREE.Mesh(new THREE.SphereGeometry(1.6, 16, 12), paint(new THREE.MeshBasicMaterial(), "mark"));
       mark.position.set(-info.half_x_mm, 0, -Math.min(10, 4 * info.half_y_mm));
       this.probeBodies.get(i)?.add(mark);
     });
@@ -373,7 +381,7 @@ export class LegScene {
     if (!skin) return;
     this.sites = sites;
     this.dots?.removeFromParent();
-    const material = new THREE.MeshBasicMaterial({ color: 0xc9d4e2, transparent: true, opacity: 0.55 });
+    const material = paint(new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.55 }), "site");
     this.dots = new THREE.InstancedMesh(new THREE.SphereGeometry(0.95, 10, 8), material, sites.length);
     this.dots.frustumCulled = false;
     this.dots.renderOrder = 4;

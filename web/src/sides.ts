@@ -2,13 +2,13 @@
 
 import * as THREE from "three";
 import type { LimbInfo } from "./protocol";
+import { ink } from "./theme";
 
 const HEIGHT_PX = 44; // of the drawn letters; shown at a third
 const SIZE = 0.032; // of the picture's height
 const AWAY_MM = 14; // from the skin
 const END_MM = 15; // of the leg that belongs to an end
 const THIGH_MM = 500; // a longer leg goes on below the knee
-const INK = "#c9d6e4";
 const INNER = "inner side", OUTER = "outer side";
 
 function words(text: string): THREE.Sprite {
@@ -21,8 +21,8 @@ function words(text: string): THREE.Sprite {
   c.font = font;
   c.textBaseline = "middle";
   c.lineWidth = 7;
-  c.strokeStyle = "#10161d";
-  c.fillStyle = INK;
+  c.strokeStyle = ink("leg-words-edge");
+  c.fillStyle = ink("leg-words");
   c.strokeText(text, 8, HEIGHT_PX / 2);
   c.fillText(text, 8, HEIGHT_PX / 2);
   const map = new THREE.CanvasTexture(canvas);

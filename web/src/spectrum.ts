@@ -5,6 +5,7 @@ import { draw, find, make } from "./dom";
 import { read, smoothed, type Readings } from "./readings";
 import type { Controls, SpectrumColumn, SpectrumFrame } from "./protocol";
 import type { DopplerSound } from "./sound";
+import { ink } from "./theme";
 
 const KEPT = 1000; // columns: 10 s
 const SHOWN_S = 6;
@@ -190,7 +191,7 @@ export class SpectrumView {
     }
     const c = this.canvas.getContext("2d")!;
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
-    c.fillStyle = "#000";
+    c.fillStyle = ink("black");
     c.fillRect(0, 0, w, h);
     const high = h - FOOT_PX;
     if (this.axes && this.columns.length > 0) this.paintStrip(c, plot, high);
@@ -217,7 +218,7 @@ export class SpectrumView {
   private paintAxes(c: CanvasRenderingContext2D, w: number, high: number): void {
     c.font = "11px system-ui, sans-serif";
     c.textBaseline = "middle";
-    c.fillStyle = c.strokeStyle = "#98a5b5";
+    c.fillStyle = c.strokeStyle = ink("muted", "picture");
     c.lineWidth = 1;
     c.clearRect(0, 0, LEFT_PX - 1, high + FOOT_PX);
     c.textAlign = "right";
@@ -231,11 +232,11 @@ export class SpectrumView {
         c.fillRect(LEFT_PX - 5, Math.round(y), 4, 1);
       }
       c.fillText("cm/s", LEFT_PX - 7, 6);
-      c.fillStyle = "#56b4e9"; // the base line
+      c.fillStyle = ink("base-line"); // the base line
       c.fillRect(LEFT_PX, Math.round(high * (1 - this.shareOf(0))), w - LEFT_PX, 1);
     }
     // Whole seconds.
-    c.fillStyle = "#98a5b5";
+    c.fillStyle = ink("muted", "picture");
     c.textAlign = "center";
     const [, last] = this.span();
     for (let n = Math.floor((last * STEP_S) / 1) * (1 / STEP_S); n > last - SHOWN_S / STEP_S && n >= 0; n -= 1 / STEP_S) {
@@ -246,7 +247,7 @@ export class SpectrumView {
     for (const n of this.squeezes) {
       const x = this.xOf(n);
       if (x <= LEFT_PX) continue;
-      c.fillStyle = "#e6b450";
+      c.fillStyle = ink("focus");
       c.beginPath();
       c.moveTo(x, high - 8);
       c.lineTo(x - 5, high);
@@ -259,9 +260,9 @@ export class SpectrumView {
   private paintTrace(c: CanvasRenderingContext2D, high: number): void {
     const [first] = this.span();
     const shown = this.columns.filter((k) => k.number >= first);
-    for (const [key, colour] of [["edge_cm_s", "#ffe08a"], ["mean_cm_s", "#5fd38d"]] as const) {
+    for (const [key, colour] of [["edge_cm_s", "mark"], ["mean_cm_s", "good"]] as const) {
       const values = smoothed(shown.map((k) => k[key]));
-      c.strokeStyle = colour;
+      c.strokeStyle = ink(colour, "picture");
       c.lineWidth = 1.2;
       c.beginPath();
       shown.forEach((k, n) => {

@@ -3,8 +3,8 @@
 
 import * as THREE from "three";
 import type { Target } from "./protocol";
+import { paint } from "./theme";
 
-const COLOUR = { wanted: 0xffc857, reached: 0x5fd38d };
 const LIFT_MM = 1.5; // above the skin
 
 export class TargetMark {
@@ -34,8 +34,7 @@ export class TargetMark {
   private build(target: Target, reached: boolean): void {
     for (const old of this.group.children) (old as THREE.Mesh).geometry.dispose();
     this.group.clear();
-    this.material.color.setHex(reached ? COLOUR.reached : COLOUR.wanted);
-    this.faint.color.copy(this.material.color);
+    for (const material of [this.material, this.faint]) paint(material, reached ? "reached" : "wanted");
     const r = Math.max(5, target.radius_mm);
     this.add(new THREE.RingGeometry(r - 1.1, r, 64), this.material);
     this.add(new THREE.CircleGeometry(r - 1.1, 48), this.faint);

@@ -3,11 +3,11 @@
 import uPlot from "uplot";
 import { find, nameDrawing } from "./dom";
 import type { Snapshot } from "./protocol";
+import { ink, onTheme } from "./theme";
 
 const SPAN_S = 15;
 const REDRAW_S = 0.1;
 const JUMP_S = 3; // a step of time larger than this, or back, starts the curve anew
-const INK = { grid: "#1e2630", axis: "#98a5b5", force: "#5cc8c2", vein: "#8ab0f7" };
 
 export class Traces {
   private times: number[] = [];
@@ -23,6 +23,7 @@ export class Traces {
     this.plot = new uPlot(this.options(), [[], [], []], this.box);
     nameDrawing(this.box, "Force in newtons and vein area in percent over the last 15 seconds");
     new ResizeObserver(() => this.resize()).observe(this.box);
+    onTheme(() => this.plot.redraw());
     this.resize();
   }
 
@@ -33,7 +34,7 @@ export class Traces {
 
   private options(): uPlot.Options {
     const font = "11px system-ui, sans-serif";
-    const axis = { stroke: INK.axis, font, grid: { stroke: INK.grid, width: 1 }, ticks: { show: false } };
+    const axis = { stroke: () => ink("muted"), font, grid: { stroke: () => ink("grid"), width: 1 }, ticks: { show: false } };
     const last = (unit: string) => (_u: uPlot, ticks: number[]): string[] => ticks.map((t, i) => (i === ticks.length - 1 ? `${t} ${unit}` : `${t}`));
     const range = (): [number, number] => {
       const now = this.times[this.times.length - 1] ?? 0;
@@ -49,13 +50,13 @@ export class Traces {
       axes: [
         { ...axis, size: 22, gap: 2, align: 2, splits: () => [0, 3, 6, 9, 12].map((s) => range()[1] - s).reverse(),
           values: (_u, ticks) => ticks.map((t) => { const ago = Math.round(range()[1] - t); return ago === 0 ? "now" : `${ago} s`; }) },
-        { ...axis, scale: "n", size: 38, gap: 4, stroke: INK.force, values: last("N") },
-        { ...axis, scale: "vein", side: 1, size: 44, gap: 4, stroke: INK.vein, grid: { show: false }, splits: [0, 50, 100], values: last("%") },
+        { ...axis, scale: "n", size: 38, gap: 4, stroke: () => ink("accent"), values: last("N") },
+        { ...axis, scale: "vein", side: 1, size: 44, gap: 4, stroke: () => ink("vein"), grid: { show: false }, splits: [0, 50, 100], values: last("%") },
       ],
       series: [
         {},
-        { scale: "n", stroke: INK.force, width: 2, points: { show: false } },
-        { scale: "vein", stroke: INK.vein, width: 2, dash: [7, 4], points: { show: false }, spanGaps: false },
+        { scale: "n", stroke: () => ink("accent"), width: 2, points: { show: false } },
+        { scale: "vein", stroke: () => ink("vein"), width: 2, dash: [7, 4], points: { show: false }, spanGaps: false },
       ],
     };
   }
