@@ -334,6 +334,11 @@ const GROUPS = {
         most_late_percent: Math.max(0, ...late.map(v => 100 * (v.force_n / v.most_n - 1))) }
     },
   },
+  // A scripted expert and a novice on every bundled case from groin to calf: some hours, see SONDE_WHOLE_LEG.
+  whole_leg: {
+    sources: ['src/sonde-exam', 'src/sonde/interior', 'src/sonde-limb', ...engine, 'data/cases', 'data/protocols', 'bench/whole_leg.mjs'],
+    measure: bin => JSON.parse(execFileSync(process.execPath, ['bench/whole_leg.mjs', join(bin, 'sonde')], { encoding: 'utf8', cwd: HOME })),
+  },
   // What ten whole legs cost.
   legs: {
     sources: ['src/sonde-limb', 'src/sonde/interior', 'src/sonde/echo', ...engine, 'bench/bench_legs.c'],

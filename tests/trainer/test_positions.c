@@ -227,6 +227,37 @@ static void a_case_says_what_the_patient_can(void **state) {
       SONDE_FORMAT);
 }
 
+// A branch's mouth closes with the vein that it opens into: where the great saphenous vein's arch
+// runs along the beam it asks for no more than twice the force of the common femoral vein behind
+// it, which a hand gives.
+static void branches_in_the_groin_close_with_the_main_vein(void **state) {
+  (void)state;
+  static const char *const PATIENT[] = {"popliteal-near", "calf-to-knee"};
+  const sonde_exam_protocol groin = protocol_of(
+      "{sonde_protocol: 1, id: a, title: A, text: a, places: ["
+      "{title: B, text: b, at: {station: saphenofemoral_junction}, position: supine_turned}, "
+      "{title: C, text: c, at: {station: saphenofemoral_junction}, position: supine_turned, "
+      "segment: great_saphenous}]}");
+  for (size_t k = 0; k < SONDE_COUNT_OF(PATIENT); ++k) {
+    static sonde_case patient;
+    static sonde_exam_setups setups;
+    static sonde_plan plan;
+    sonde_error error = {0};
+    char path[1024];
+    snprintf(path, sizeof path, SONDE_SOURCE_DIR "/data/cases/%s.yaml", PATIENT[k]);
+    sonde_status status = sonde_case_load(path, &patient, &error);
+    if (!status)
+      status = sonde_exam_prepare(&patient, &groin, NULL, NULL, NULL, &setups, &plan, &error);
+    if (status) fail_msg("%s: %s", PATIENT[k], error.message);
+    assert_int_equal(plan.count, 2);
+    const double main_n = plan.point[0].target.closes_n, branch_n = plan.point[1].target.closes_n;
+    print_message("%s: %.1f N, great saphenous vein %.1f N\n", PATIENT[k], main_n, branch_n);
+    assert_true(main_n > 5 && main_n < 20 && branch_n < 20);
+    assert_true(branch_n < 2 * main_n);
+    sonde_exam_setups_clear(&setups);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_place_has_its_like),
@@ -234,6 +265,7 @@ int main(void) {
       cmocka_unit_test(turning_ends_a_press),
       cmocka_unit_test(an_operator_asks_for_the_position),
       cmocka_unit_test(a_case_says_what_the_patient_can),
+      cmocka_unit_test(branches_in_the_groin_close_with_the_main_vein),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,7 +11,7 @@ enum { DIRECTIONS = 120, SMOOTH = 4, COURSE = 10 }; // the last two: points to e
 static const double REACH_M = 0.2;
 static const double FACE_HALF_M = 0.025; // half of the picture's width: veins farther aside are not
                                          // in it
-enum { SLIDES = 6, STEADY = 2 };
+enum { SLIDES = 10, STEADY = 2 };
 static const double SLIDE_M = 0.002;
 static const double MOST_ALONG_BEAM = 0.5; // cosine between a vein and the beam
 
@@ -177,7 +177,7 @@ static sonde_vec3 cross_line(const sonde_vessel *line, sonde_pose probe) {
   return found;
 }
 
-// A vein that begins or ends beside the station is looked for within a finger's breadth, where it
+// A vein that begins or ends beside the station is looked for within 20 mm, where it
 // stays in the plane when the tissue moves a little under the press, and where it runs across the
 // plane: along the beam, as in the arch of a saphenous vein, a press hardly closes it.
 static void find_vein(const sonde_model *model, const sonde_exam_segment *segment, uint32_t number,

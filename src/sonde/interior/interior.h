@@ -88,6 +88,8 @@ typedef struct sonde_vessel_section {
   double tissue_m; // from the skin to the bone
   double coupling; // of the tissue by its wall: 0 where it opens into another vessel, 1 beyond
   uint64_t beside; // a bit per branch that its wall may meet
+  // The vein that it opens into and the section there; SONDE_VESSELS: it is no mouth.
+  uint32_t opens_into, opens_at;
 } sonde_vessel_section;
 
 // A vessel. Its sections count along a straight line of its own: the leg's axis, or for a vessel
@@ -218,6 +220,8 @@ void sonde_interior_next_window(sonde_interior *interior, const double footprint
 // Stages of a creation.
 sonde_status sonde_columns_create(sonde_interior *interior, sonde_error *error);
 sonde_status sonde_sections_create(sonde_interior *interior, sonde_error *error);
+// Which sections of a branch are its mouths, and where they open.
+void sonde_sections_find_mouths(sonde_interior *interior, uint32_t branch);
 // Where the branches' walls can move tissue, as wide as their lumina may be.
 void sonde_sections_mark(sonde_interior *interior);
 

@@ -83,7 +83,8 @@ static sonde_status resample(sonde_interior *in, uint32_t which, const sonde_ves
                                 .radius_m = a->radius_m + t * (b->radius_m - a->radius_m),
                                 .depth_m = a->depth_m + t * (b->depth_m - a->depth_m),
                                 .coupling = 1,
-                                .beside = UINT64_MAX};
+                                .beside = UINT64_MAX,
+                                .opens_into = SONDE_VESSELS};
     if (!(one.radius_m > 0) || !v_finite(one.rest_m))
       return sonde_fail(error, SONDE_ARGUMENT, "vessel %u has a point without radius", which);
     sonde_column_point at;
@@ -199,6 +200,7 @@ sonde_status sonde_sections_create(sonde_interior *in, sonde_error *error) {
       }
       in->course[which].lies[section->in_fat] = true;
     }
+    sonde_sections_find_mouths(in, which);
   }
   // Of a limb's many branches each section knows those that its wall may meet.
   for (uint32_t which = 0; which < in->vessel_count && in->model->bone_axis_m != NULL; ++which)

@@ -184,6 +184,12 @@ static void update_vessel(sonde_interior *in, uint32_t which, const load *l,
     else if (v->outside_pa > 0 || clot)
       goal = sonde_vein_area_in(&held[clot], v->outside_pa, section->in_fat);
     v->area_ratio = fmax(v->area_ratio + (goal - v->area_ratio) * blend, least_ratio);
+    // A mouth is a hole in the wall of the vein that it opens into: it closes with it, but for
+    // clot.
+    if (section->opens_into < which) {
+      const double parent = in->state[section->opens_into][section->opens_at].area_ratio;
+      v->area_ratio = fmin(v->area_ratio, fmax(parent, held[clot].thrombus_fraction));
+    }
     double engaged = fmax(fabs(1 - v->area_ratio) / sonde_engaged_loss, v->outside_pa / engaged_pa);
     v->coupling = section->coupling * clamp(engaged, 0, 1);
     v->rest_radius_m = section->radius_m * scale;
