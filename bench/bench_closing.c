@@ -248,13 +248,16 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
         uint32_t mate = sonde_limb_vessel_get(l.limb, stations[s].vein[k]).mate;
         vein *v = &veins[s][k];
         *v = (vein){.area = 1, .artery_area = 1, .which = find_vessel(&l, stations[s].vein[k])};
-        // Each vein has a depth of its own along the station's beam.
+        // Each vein has a depth of its own along the station's beam, below the skin above it: the
+        // skin beside the middle of the face is farther down.
         const sonde_limb_station *at = &stations[s];
         const sonde_limb_vessel_point place =
             sonde_limb_vessel_place(l.limb, at->vein[k], at->arc_m[k]);
-        const sonde_vec3 beam = pose_axis(at->probe, 2);
-        const double front_m =
-            vec_dot(place.centre_m, beam) - vec_dot(at->skin_m, beam) - place.radius_m;
+        const sonde_vec3 middle = sonde_limb_to_model(l.limb, place.centre_m);
+        const sonde_vec3 beam = pose_axis(l.map.station[s].probe, 2);
+        sonde_surface_point above;
+        const bool met = sonde_surface_raycast(l.interior->skin, middle, v_neg(beam), 0.2, &above);
+        const double front_m = met ? v_distance(middle, above.point_m) - place.radius_m : 0;
         v->depth_m = fmax(front_m, 1e-3);
         sonde_limb_force_band(v->depth_m, v->band);
         v->artery = mate == SONDE_LIMB_NO_VESSEL ? 1 : find_vessel(&l, mate);
