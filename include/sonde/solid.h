@@ -121,7 +121,7 @@ typedef struct sonde_equilibrium_def {
   double rounding_m;   /**< radius of a rounding around the probe's body, whose tip stays where it
                             is and whose sides grow by it; 0 */
   double contact_n_m3; /**< pressure of the contact per depth of the skin in the probe; 1e9 */
-  double zone_m;       /**< skin that may touch: this far around the footprint; 22 mm */
+  double zone_m;       /**< skin that may touch: this far around the footprint; 15 mm */
   double step_m;       /**< the probe's way is solved in steps of at most this; 3 mm */
   double tolerance;    /**< largest residual over the contact's force; 1e-8 */
 } sonde_equilibrium_def;
@@ -135,7 +135,7 @@ typedef struct sonde_equilibrium_result {
   double contact_j;     /**< of the contact; both together are the work that pressing took */
   double area_m2;       /**< skin in contact, at rest */
   double deepest_m;     /**< of the skin in the probe */
-  double residual;      /**< over the contact's force */
+  double residual;      /**< over the contact's force, or what rounding allows of it */
   uint32_t steps;       /**< Newton steps of the whole solid */
   uint32_t inner_steps; /**< and of the contact on the condensed solid */
   uint32_t shifts;      /**< steps whose stiffness was made positive definite by a shift */

@@ -1,9 +1,10 @@
-// A solid with a probe: uniform strains are reproduced, a thick-walled tube, a ball and a punch
-// meet their closed forms, energy equals work, one depth has one force whatever the way, and a
-// probe that contains another never does less work.
+// A solid with a probe: uniform strains are reproduced, a thick-walled tube, a thick-walled sphere
+// and a ball on thick and thin ground meet theory, energy equals work, one depth has one force
+// whatever the way, and a probe that contains another never does less work.
 #include "fixture.h"
 #include "solid/equilibrium.h"
 #include "solid/grid.h"
+#include "sparse/dense.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -261,49 +262,167 @@ static sonde_equilibrium_result find(bench *b, double depth_m) {
 
 static double poisson(double bulk) { return (3 * bulk - 2) / (2 * (3 * bulk + 1)); }
 
-// A quarter of a block whose lines lie ever farther apart behind the contact.
-static sonde_vec3 place_in_quarter(const void *user, double level, uint32_t u, uint32_t v) {
-  const sonde_lines *lines = user;
-  return vec3(lines->at[u], lines->at[v], -lines->at[lines->count - 1] * (1 - level / 3));
+// Part of a block under a ball: lines of nodes along u, v and down from the skin.
+typedef struct ball_lines {
+  sonde_lines u, v, down;
+} ball_lines;
+
+static sonde_vec3 place_under_ball(const void *user, double level, uint32_t u, uint32_t v) {
+  const ball_lines *l = user;
+  return vec3(l->u.at[u], l->v.at[v], -l->down.at[l->down.count - 1] * (1 - level / 3));
 }
 
-// Hertz 1881: F = 4/3 E/(1 - nu^2) sqrt(R) d^(3/2) for a ball on a half space, whose contact has
-// the radius sqrt(R d). A quarter of the block does, as its inner sides stay in their planes.
+// `inside` even edges from 0, then edges that grow, until `far`.
+static sonde_lines lines_from_middle(double edge, uint32_t inside, double growth, double far) {
+  sonde_lines lines = {.count = 1};
+  for (double step = edge; lines.at[lines.count - 1] < far; ++lines.count) {
+    if (lines.count > inside) step *= growth;
+    lines.at[lines.count] = lines.at[lines.count - 1] + step;
+  }
+  return lines;
+}
+
+// A rigid ball over a thick or thin layer on a rigid base. A quarter of the block does, as its
+// inner sides stay in their planes.
+static void make_ball_bench(bench *b, double radius_m, const ball_lines *lines,
+                            const sonde_equilibrium_def *def) {
+  sonde_error error;
+  char name[32];
+  const sonde_lines *down = &lines->down;
+  sonde_levels levels = {.count = down->count}; // from the base up
+  for (uint32_t k = 0; k < levels.count; ++k)
+    levels.at[k] = 3 * (1 - down->at[down->count - 1 - k] / down->at[down->count - 1]);
+  const sonde_grid_shape shape = {&levels, lines->u.count,   lines->v.count,
+                                  false,   place_under_ball, lines};
+  *b = (bench){0};
+  check(sonde_hexes_bend(&shape, &b->mesh, &error), &error);
+  for (uint32_t n = 0; n < b->mesh.node_count; ++n) {
+    const uint32_t u = n / lines->v.count % lines->u.count, v = n % lines->v.count;
+    if (u == 0 || u == lines->u.count - 1) b->mesh.held[n] |= 1;
+    if (v == 0 || v == lines->v.count - 1) b->mesh.held[n] |= 2;
+  }
+  snprintf(name, sizeof name, "ball:%g", 1e3 * radius_m);
+  check(sonde_probe_create(name, &b->probe, &error), &error);
+  check(sonde_equilibrium_create(&b->mesh, &b->probe, above(0), def, &b->e, &error), &error);
+}
+
+// Hertz 1881: F = 4/3 E/(1 - nu^2) sqrt(R) d^(3/2) on a half space.
+static double hertz_n(double shear_pa, double bulk, double radius_m, double d) {
+  const double nu = poisson(bulk);
+  return 8.0 / 3 * shear_pa / (1 - nu) * sqrt(radius_m) * pow(d, 1.5);
+}
+
+// The contact has the radius sqrt(R d).
 static void ball_on_a_half_space(void **state) {
   (void)state;
-  enum { INSIDE = 5 };
-  sonde_error error;
-  sonde_lines lines = {.count = 0};
-  const double d = 0.25e-3, radius = 40e-3, edge = 0.75e-3;
-  double at = 0, step = edge;
-  while (at < 0.3) {
-    lines.at[lines.count++] = at, at += step;
-    if (lines.count > INSIDE) step *= 2;
-  }
-  sonde_levels levels = {.count = lines.count}; // the same lines downwards, from the base up
-  const double far = lines.at[lines.count - 1];
-  for (uint32_t k = 0; k < lines.count; ++k)
-    levels.at[k] = 3 * (1 - lines.at[lines.count - 1 - k] / far);
-  const sonde_grid_shape shape = {&levels, lines.count,      lines.count,
-                                  false,   place_in_quarter, &lines};
-  bench b = {0};
-  check(sonde_hexes_bend(&shape, &b.mesh, &error), &error);
-  for (uint32_t n = 0; n < b.mesh.node_count; ++n) {
-    const sonde_vec3 p = b.mesh.node[n];
-    if (p.x <= 0 || p.x >= far) b.mesh.held[n] |= 1;
-    if (p.y <= 0 || p.y >= far) b.mesh.held[n] |= 2;
-  }
-  sonde_equilibrium_def def = one_material(ogden(3 * kpa, 2, 24));
+  const double d = 0.25e-3, radius = 40e-3, edge = 0.75e-3, shear = 3 * kpa;
+  const sonde_lines line = lines_from_middle(edge, 5, 2, 0.3);
+  const ball_lines lines = {line, line, line};
+  sonde_equilibrium_def def = one_material(ogden(shear, 2, 24));
   def.zone_m = 1e-3;
-  check(sonde_probe_create("ball:40", &b.probe, &error), &error);
-  b.probe.half_x_m = b.probe.half_y_m = 4e-3;
-  check(sonde_equilibrium_create(&b.mesh, &b.probe, above(0), &def, &b.e, &error), &error);
-  const double nu = poisson(24), young = 2 * 3 * kpa * (1 + nu);
-  const double want = 4.0 / 3 * young / (1 - nu * nu) * sqrt(radius) * pow(d, 1.5);
-  const double got = 4 * find(&b, d).force_n.z;
+  bench b;
+  make_ball_bench(&b, radius, &lines, &def);
+  const double want = hertz_n(shear, 24, radius, d), got = 4 * find(&b, d).force_n.z;
   print_message("Hertz: %.5f N, closed form %.5f (%+.1f %%), %u unknowns, %.1f faces per radius\n",
                 got, want, 100 * (got / want - 1), 3 * b.e->unknown_count, sqrt(radius * d) / edge);
   assert_near(got / want, 1, 0.05);
+  // A hundredth of the way, none at all and none again: what rounding leaves of the forces of
+  // elements of 0.2 m is no lack of equilibrium.
+  assert_true(find(&b, d / 100).force_n.z > 0);
+  for (int again = 0; again < 2; ++again) assert_near(find(&b, 0).force_n.z, 0, 1e-9);
+  drop_bench(&b);
+}
+
+// Gauss-Legendre points and weights on 0 to 1, by Newton's method on the polynomial.
+static void gauss(uint32_t count, double *at, double *weight) {
+  for (uint32_t k = 0; k < count; ++k) {
+    double x = cos(SONDE_PI * (k + 0.75) / (count + 0.5)), slope = 1;
+    for (int step = 0; step < 50; ++step) {
+      double p[2] = {1, x};
+      for (uint32_t n = 2; n <= count; ++n) {
+        const double next = ((2 * n - 1) * x * p[1] - (n - 1) * p[0]) / n;
+        p[0] = p[1], p[1] = next;
+      }
+      slope = count * (p[0] - x * p[1]) / (1 - x * x);
+      x -= p[1] / slope;
+    }
+    at[k] = 0.5 * (1 - x), weight[k] = 1 / ((1 - x * x) * slope * slope);
+  }
+}
+
+// A ball of radius 1 that touches a layer, bonded to a rigid base, within the radius 1.
+typedef struct layer_contact {
+  double depth, over_hertz; // d R/a^2; force over that on a half space at the same depth
+} layer_contact;
+
+// Hayes, Keer, Herrmann and Mockros 1972. A pressure with the Hankel transform A(x) moves the skin
+// by (1 - nu)/G integral of A M(x h) J0(x r) dx, with k = 3 - 4 nu and
+//   M(w) = (2 k sinh 2w - 4 w)/(2 k cosh 2w + 1 + k^2 + 4 w^2).
+// A = integral over 0 to a of f(t) cos(x t) leaves none outside of the contact. Inside, with
+// K(x, t) = integral of (M(w h) - 1) cos(w x) cos(w t) dw and up to a factor,
+//   f(x) + 2/pi integral over 0 to a of K(x, t) f(t) dt = d - x^2/R,
+// f(a) = 0 as the pressure ends at 0, and the force is 8/3 / (2/3) integral of f over that of M
+// = 1.
+static layer_contact hayes(double radius_over_thickness, double nu) {
+  enum { NODES = 24, WAVES = 80 };
+  double x[NODES + 1], weight[NODES + 1], w[WAVES], part[WAVES];
+  double matrix[NODES * NODES], edge[NODES], one[NODES], square[NODES];
+  gauss(NODES, x, weight), gauss(WAVES, w, part);
+  x[NODES] = 1, weight[NODES] = 1;
+  const double k = 3 - 4 * nu, most = 20; // M = 1 to 1e-14 beyond
+  for (uint32_t i = 0; i <= NODES; ++i)
+    for (uint32_t j = 0; j < NODES; ++j) {
+      double kernel = 0;
+      for (uint32_t n = 0; n < WAVES; ++n) {
+        const double v = most * w[n], wave = v * radius_over_thickness;
+        const double m =
+            (2 * k * sinh(2 * v) - 4 * v) / (2 * k * cosh(2 * v) + 1 + k * k + 4 * v * v);
+        kernel +=
+            most * radius_over_thickness * part[n] * (m - 1) * cos(wave * x[i]) * cos(wave * x[j]);
+      }
+      kernel *= 2 / SONDE_PI * sqrt(weight[i] * weight[j]); // symmetric
+      if (i < NODES)
+        matrix[i * NODES + j] = kernel + (i == j);
+      else
+        edge[j] = kernel;
+    }
+  for (uint32_t i = 0; i < NODES; ++i)
+    one[i] = sqrt(weight[i]), square[i] = sqrt(weight[i]) * x[i] * x[i];
+  assert_true(sonde_cholesky(matrix, NODES));
+  sonde_cholesky_solve(matrix, NODES, one);
+  sonde_cholesky_solve(matrix, NODES, square);
+  double at_edge[2] = {1, 1}, sum[2] = {0, 0};
+  for (uint32_t i = 0; i < NODES; ++i) {
+    at_edge[0] -= edge[i] * one[i], sum[0] += sqrt(weight[i]) * one[i];
+    at_edge[1] -= edge[i] * square[i], sum[1] += sqrt(weight[i]) * square[i];
+  }
+  const double depth = at_edge[1] / at_edge[0];
+  return (layer_contact){depth, 1.5 * (depth * sum[0] - sum[1]) / pow(depth, 1.5)};
+}
+
+// A layer as thick as makes a ball's force three times that on a half space.
+static void ball_on_a_thin_layer(void **state) {
+  (void)state;
+  const double nu = poisson(24), radius = 0.2, a = 6e-3, shear = 3 * kpa;
+  assert_near(hayes(1e-3, nu).over_hertz, 1, 2e-3);
+  double low = 0.1, high = 5;
+  while (high - low > 1e-9) {
+    const double middle = 0.5 * (low + high);
+    *(hayes(middle, nu).over_hertz < 3 ? &low : &high) = middle;
+  }
+  const layer_contact c = hayes(low, nu);
+  const double thick = a / low, d = c.depth * a * a / radius;
+  ball_lines lines = {.down = lines_from_middle(thick / 6, 6, 2, thick * (1 - 1e-9))};
+  lines.u = lines.v = lines_from_middle(a / 6, 8, 1.4, a + 6 * thick);
+  sonde_equilibrium_def def = one_material(ogden(shear, 2, 24));
+  def.zone_m = 1e-3, def.contact_n_m3 = 1e10;
+  bench b;
+  make_ball_bench(&b, radius, &lines, &def);
+  const double want = 3 * hertz_n(shear, 24, radius, d), got = 4 * find(&b, d).force_n.z;
+  print_message("Hayes: a/h %.4f, d R/a^2 %.4f: %.5f N, integral equation %.5f (%+.1f %%), %u "
+                "unknowns\n",
+                low, c.depth, got, want, 100 * (got / want - 1), 3 * b.e->unknown_count);
+  assert_near(got / want, 1, 0.02);
   drop_bench(&b);
 }
 
@@ -490,6 +609,7 @@ int main(void) {
       cmocka_unit_test(thick_tube_at_large_strain),
       cmocka_unit_test(thick_sphere_at_large_strain),
       cmocka_unit_test(ball_on_a_half_space),
+      cmocka_unit_test(ball_on_a_thin_layer),
       cmocka_unit_test(energy_equals_work),
       cmocka_unit_test(one_force_for_one_depth),
       cmocka_unit_test(force_changes_match_differences),

@@ -29,6 +29,7 @@ struct sonde_equilibrium {
   double *schur, *matrix;           // [side * side], side = 3 zone_count
   float *front;                     // [side][stride] of the contact's matrix
   double *way, *way_trial, *load, *touch, *right, *touch_trial; // [side]
+  double least_load_n;                                          // that residuals are compared with
   double shift;  // of the stiffness, over an element's mean diagonal
   bool factored; // the factor is that of the state or of the last step towards it, without shift
 };

@@ -10,7 +10,6 @@
 enum { STEPS_MOST = 60, INNER_MOST = 60, HALVINGS = 12, SHIFTS_MOST = 8 };
 static const double first_shift = 1e-3, more_shift = 5, armijo = 1e-4;
 static const double rounding = 1e-9, inner_rounding = 1e-13; // of energies, over themselves
-static const double least_load_n = 1e-4;                     // that residuals are compared with
 
 static double norm(const double *x, size_t count) {
   double sum = 0;
@@ -240,7 +239,7 @@ static bool stand(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u, st
     else
       rest += r * r, load += e->touch[i] * e->touch[i];
   }
-  s->residual = sqrt(rest), s->load = fmax(sqrt(load), least_load_n);
+  s->residual = sqrt(rest), s->load = fmax(sqrt(load), e->least_load_n);
   return isfinite(s->energy_j);
 }
 
