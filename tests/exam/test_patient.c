@@ -267,7 +267,7 @@ static void controls_survive_the_bytes(void **state) {
   c.pathology.wall_shear_pa = 12345.678;
   c.squeeze = 5, c.deep_breath = 6;
   c.duplex = (sonde_duplex_controls){SONDE_DUPLEX_POWER,
-                                     {-0.01, 0.012, 0.004, 0.04, 0.1},
+                                     {-0.01, 0.012, 0.004, 0.04, 0.1, 0},
                                      0.25,
                                      3,
                                      true,
@@ -347,7 +347,7 @@ static sonde_session *open_along_vein(sonde_session_def *def) {
 static void colour_follows_blood_and_hand(void **state) {
   sonde_session_def def = small_def(*state);
   def.controls.duplex.shown = SONDE_DUPLEX_VELOCITY;
-  def.controls.duplex.box = (sonde_colour_box){-0.012, 0.012, 0.001, 0.05, 0.35};
+  def.controls.duplex.box = (sonde_colour_box){-0.012, 0.012, 0.001, 0.05, 0.35, 0};
   def.controls.duplex.scale_m_s = 0.3;
   sonde_session *session = open_along_vein(&def);
   sonde_session_controls c = sonde_session_controls_now(session);

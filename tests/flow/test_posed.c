@@ -120,7 +120,7 @@ static void test_bent_knee(void **unused) {
   sonde_flow flow;
   assert_int_equal(sonde_flow_start(&def, &flow, NULL), SONDE_OK);
   sonde_flow_scene_run(scene, &flow, 1.0);
-  const sonde_colour_box box = {-0.02, 0.02, 0.003, 0.043, 0};
+  const sonde_colour_box box = {-0.02, 0.02, 0.003, 0.043, 0, 0};
   sonde_flow_scene_cells(scene, echo, &box, cells);
   double through = 0;
   uint32_t count = 0;
