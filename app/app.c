@@ -1,5 +1,6 @@
 // Shared by the subcommands: messages and exit codes, numbers of options, the bundled model.
 #include "app.h"
+#include "start.h"
 
 #include <assert.h>
 #include <errno.h>
@@ -87,9 +88,7 @@ bool app_parse_integer(const char *verb, const char *option, const char *text, l
 
 // Directory two levels above the program: the build or install prefix; false when unknown.
 static bool own_prefix(char *path, size_t size) {
-  ssize_t length = readlink("/proc/self/exe", path, size - 1);
-  if (length <= 0) return false;
-  path[length] = 0;
+  if (app_program(path, size)) return false;
   for (int up = 0; up < 2; ++up) {
     char *slash = strrchr(path, '/');
     if (!slash) return false;

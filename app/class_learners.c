@@ -1,12 +1,12 @@
 // Processes of a class: started, watched, started again, ended.
 #include "class_learners.h"
+#include "start.h"
 
 #include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,15 +26,14 @@ double class_now_s(void) {
 
 // ---- starting
 
-// PROGRAM run --port N and what the user added; signals as if started from a shell; no input, no
-// output, errors to a pipe. The name and the tokens go by the environment, which no other user can
-// read, not by the command line.
+// PROGRAM run --port N and what the user added; no input, no output, errors to a pipe. The name and
+// the tokens go by the environment, which no other user can read, not by the command line.
 static int spawn(const class_room *room, class_learner *learner, int errors) {
   assert(learner->port != 0 && learner->name[0] && errors >= 0);
   static const char *const OURS[] = {"SONDE_TRAINEE=", "SONDE_PAGE_TOKEN=", "SONDE_TEACHER_TOKEN="};
   char port[8], own[3][CLASS_NAME + SONDE_PAGE_TOKEN + 24];
-  char *words[ARGUMENTS] = {(char *)room->program, "run", "--port", port};
-  char *variables[VARIABLES] = {own[0], own[1], own[2]};
+  const char *words[ARGUMENTS] = {room->program, "run", "--port", port};
+  const char *variables[VARIABLES] = {own[0], own[1], own[2]};
   int count = 4, variable = 3;
   snprintf(port, sizeof port, "%u", (unsigned)learner->port);
   snprintf(own[0], sizeof own[0], "%s%s", OURS[0], learner->name);
@@ -47,30 +46,12 @@ static int spawn(const class_room *room, class_learner *learner, int errors) {
     for (int i = 0; i < 3; ++i) ours |= strncmp(*p, OURS[i], strlen(OURS[i])) == 0;
     if (!ours) variables[variable++] = *p;
   }
-
-  posix_spawnattr_t attribute;
-  posix_spawn_file_actions_t actions;
-  sigset_t defaults, none;
-  sigemptyset(&none);
-  sigemptyset(&defaults);
-  sigaddset(&defaults, SIGINT);
-  sigaddset(&defaults, SIGTERM);
-  sigaddset(&defaults, SIGPIPE);
-  int code = posix_spawnattr_init(&attribute);
-  if (code) return code;
-  posix_spawnattr_setsigdefault(&attribute, &defaults);
-  posix_spawnattr_setsigmask(&attribute, &none);
-  posix_spawnattr_setflags(&attribute, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
-  code = posix_spawn_file_actions_init(&actions);
-  if (!code) code = posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  if (!code) code = posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
-  if (!code) code = posix_spawn_file_actions_adddup2(&actions, errors, 2);
-  if (!code)
-    code = posix_spawn(&learner->process, room->program, &actions, &attribute, words, variables);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attribute);
-  if (code) learner->process = 0;
-  return code;
+  const app_program_start what = {.words = words,
+                                  .variables = variables,
+                                  .input = APP_NOTHING,
+                                  .output = APP_NOTHING,
+                                  .errors = errors};
+  return app_start(&what, &learner->process);
 }
 
 static const class_status UNKNOWN = {.elapsed_s = (double)NAN, .score = (double)NAN};

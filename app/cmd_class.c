@@ -1,6 +1,7 @@
 // sonde class: several learners on one machine, one process each, and a table for the teacher.
 #include "class_learners.h"
 #include "options.h"
+#include "start.h"
 
 #include <assert.h>
 #include <math.h>
@@ -172,12 +173,10 @@ static int run(void *from) {
   if (code == APP_OK) code = check_arguments(&room);
   if (code != APP_OK) return code;
   assert(room.count >= 1 && room.count <= CLASS_LEARNERS);
-  ssize_t length = s->program ? 1 : readlink("/proc/self/exe", program, sizeof program - 1);
-  if (length <= 0) {
+  if (!s->program && app_program(program, sizeof program)) {
     fprintf(stderr, "sonde class: /proc/self/exe cannot be read\n");
     return APP_FAILED;
   }
-  program[length] = 0;
   room.program = s->program ? s->program : program;
   static char told[CLASS_LEARNERS][128];
   double ask_s = 0;

@@ -1,18 +1,16 @@
 // sonde send: hands DICOM files to an archive by C-STORE, through the separate program storescu.
 #include "options.h"
+#include "start.h"
 
 #include <assert.h>
 #include <dirent.h>
 #include <errno.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-extern char **environ;
 
 typedef struct options {
   const char *path, *to, *called, *calling;
@@ -64,23 +62,17 @@ static sonde_status store(const options *s, const char *path, sonde_error *error
   if (!is_dicom)
     return app_error(error, SONDE_FORMAT,
                      "%.300s: expected a DICOM file, found no DICM at byte 128", path);
-  // Words that are not changed, as exec takes them.
   const char *const words[] = {"storescu", "-R",    "-aet",  s->calling, "-aec",
                                s->called,  s->host, s->port, path,       NULL};
-  posix_spawn_file_actions_t actions;
+  const app_program_start what = {
+      .words = words, .input = APP_STANDARD, .output = STDERR_FILENO, .errors = APP_STANDARD};
   pid_t child;
-  int code = posix_spawn_file_actions_init(&actions), ended = 0;
-  if (!code) code = posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-  if (!code) {
-    code = posix_spawnp(&child, words[0], &actions, NULL, (char *const *)(uintptr_t)words, environ);
-    posix_spawn_file_actions_destroy(&actions);
-  }
+  const int code = app_start(&what, &child);
   if (code == ENOENT)
     return app_error(error, SONDE_DEVICE,
                      "the program storescu, which sends, is not there (Debian package dcmtk)");
   if (code) return app_error(error, SONDE_DEVICE, "storescu did not start: %s", strerror(code));
-  while (waitpid(child, &ended, 0) < 0 && errno == EINTR) {
-  }
+  const int ended = app_await(child, false);
   return WIFEXITED(ended) && WEXITSTATUS(ended) == 0
              ? SONDE_OK
              : app_error(error, SONDE_DEVICE,

@@ -1,19 +1,17 @@
 // A film through ffmpeg, a program of its own that reads grey pictures from a pipe: Debian's
 // libraries of it carry parts under the GPL, which a library that links them would take on.
 #include "replay_export.h"
+#include "start.h"
 
 #include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-extern char **environ;
 
 struct film {
   const char *path; // the caller's
@@ -55,7 +53,7 @@ sonde_status film_open(const char *path, uint32_t width, uint32_t height, int fr
   char size[32], rate[16];
   snprintf(size, sizeof size, "%ux%u", width, height);
   snprintf(rate, sizeof rate, "%d", frames_per_s);
-  const char *arguments[] = {
+  const char *const arguments[] = {
       "ffmpeg",     "-hide_banner", "-loglevel",   "error",
       "-nostdin",   "-y",           "-f",          "rawvideo",
       "-pix_fmt",   "gray",         "-video_size", size,
@@ -63,21 +61,12 @@ sonde_status film_open(const char *path, uint32_t width, uint32_t height, int fr
       "-an",        "-pix_fmt",     "yuv420p",     "-movflags",
       "+faststart", "-f",           "mp4",         sonde_file_temporary(f->file),
       NULL};
-  posix_spawn_file_actions_t actions;
-  posix_spawnattr_t attributes;
-  sigset_t pipe_signal;
-  sigemptyset(&pipe_signal);
-  sigaddset(&pipe_signal, SIGPIPE);
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[0], 0);
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setsigdefault(&attributes, &pipe_signal);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF);
-  char *argv[sizeof arguments / sizeof arguments[0]];
-  memcpy(argv, arguments, sizeof argv);
-  int failure = posix_spawnp(&f->child, "ffmpeg", &actions, &attributes, argv, environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
+  const app_program_start what = {.words = arguments,
+                                  .input = ends[0],
+                                  .output = APP_STANDARD,
+                                  .errors = APP_STANDARD,
+                                  .own_group = true};
+  const int failure = app_start(&what, &f->child);
   close(ends[0]);
   f->pipe = ends[1];
   if (!failure) {
@@ -112,9 +101,7 @@ sonde_status film_close(film *f, sonde_error *error) {
   if (!f) return SONDE_OK;
   bool broken = f->pipe < 0;
   if (!broken) close(f->pipe);
-  int code = 0;
-  while (waitpid(f->child, &code, 0) < 0 && errno == EINTR) {
-  }
+  const int code = app_await(f->child, false);
   sonde_status status = SONDE_OK;
   bool good = !broken && WIFEXITED(code) && WEXITSTATUS(code) == 0;
   if (!good) status = fail(error, SONDE_DISK, "ffmpeg failed; what it said stands above", f->path);

@@ -6,14 +6,12 @@
 // it names by a hash: the same words again do what is missing. Whoever finds all subjects whole
 // writes table and report.
 #include "options.h"
+#include "start.h"
 
 #include <assert.h>
 #include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <math.h>
-#include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,8 +19,6 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-extern char **environ;
 
 static const char VERB[] = "fit";
 
@@ -257,22 +253,17 @@ static sonde_status fit_subject(const cohort *c, const subject *s, bool *fitted,
   snprintf(said, sizeof said, "/proc/self/fd/%d", out_fd);
   snprintf(told, sizeof told, "/proc/self/fd/%d", err_fd);
   (void)sonde_file_remove_abandoned(model);
-  posix_spawn_file_actions_t actions;
-  pid_t child = 0;
-  int ended = 0, code = posix_spawn_file_actions_init(&actions);
-  if (code || out_fd < 0 || err_fd < 0)
+  if (out_fd < 0 || err_fd < 0)
     return app_error(error, SONDE_MEMORY, "out of memory or of file descriptors");
-  if (!code) code = posix_spawn_file_actions_addchdir_np(&actions, c->home);
-  if (!code)
-    code = posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  if (!code) code = posix_spawn_file_actions_adddup2(&actions, out_fd, STDOUT_FILENO);
-  if (!code) code = posix_spawn_file_actions_adddup2(&actions, err_fd, STDERR_FILENO);
-  if (!code)
-    code = posix_spawn(&child, words[0], &actions, NULL, (char *const *)(uintptr_t)words, environ);
-  posix_spawn_file_actions_destroy(&actions);
+  const app_program_start what = {.words = words,
+                                  .directory = c->home,
+                                  .input = APP_NOTHING,
+                                  .output = out_fd,
+                                  .errors = err_fd};
+  pid_t child;
+  const int code = app_start(&what, &child);
   if (code) return app_error(error, SONDE_DISK, "%s: not started: %s", s->id, strerror(code));
-  while (waitpid(child, &ended, 0) < 0 && errno == EINTR)
-    if (app_interrupted()) kill(child, SIGTERM);
+  const int ended = app_await(child, true);
   char *out_text = NULL, *err_text = NULL, message[400] = "";
   size_t out_size = 0, err_size = 0;
   sonde_json *root = NULL;
@@ -469,9 +460,8 @@ static sonde_status prepare_cohort(const options *o, cohort *c, sonde_error *err
   c->ending = ".sonde";
   for (char **word = o->rest; word && *word; ++word)
     if (strcmp(*word, "--solid") == 0) c->ending = ".csv";
-  const ssize_t length = readlink("/proc/self/exe", c->program, sizeof c->program - 1);
-  if (length < 1) return app_error(error, SONDE_DISK, "/proc/self/exe: %s", strerror(errno));
-  c->program[length] = 0;
+  const int code = app_program(c->program, sizeof c->program);
+  if (code) return app_error(error, SONDE_DISK, "/proc/self/exe: %s", strerror(code));
   if (!realpath(o->cohort, list) || stat(list, &facts))
     return app_error(error, SONDE_NOT_FOUND, "%.300s: %s", o->cohort, strerror(errno));
   const bool folders = S_ISDIR(facts.st_mode);
