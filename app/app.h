@@ -32,6 +32,8 @@ int app_check_output(const char *verb, const char *path);
 // its share in per cent and the time; the time goes on while nothing is reported. One piece of work
 // at a time; app_progress_end() comes before anything is printed.
 sonde_progress app_progress(void);
+// From here on the share that is done goes to stderr as lines, "12 %", wherever that is.
+void app_progress_lines(void);
 // The same for work that reports no share and cannot be cancelled but by ending the program: the
 // line says what is done and for how long.
 void app_progress_begin(const char *what);

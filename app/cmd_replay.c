@@ -1,4 +1,5 @@
 // sonde replay: plays a recording again and compares hashes, or exports what it shows.
+#include "exam_app_export.h"
 #include "options.h"
 #include "replay_export.h"
 
@@ -8,17 +9,21 @@
 #include <unistd.h>
 
 typedef struct options {
-  const char *recording, *model;
+  const char *recording, *model, *cases;
   replay_export what;
-  bool json, images, recover;
+  bool json, images, recover, progress;
 } options;
 
 static const options DEFAULTS = {.what.to_s = 1e6};
 
 static const app_option TABLE[] = {
     OPT_ARGUMENT(recording, "RECORDING", NULL),
-    OPT_TEXT(model, "m,model", "MODEL",
-             "model file; default: the one that the recording names, or the bundled thigh"),
+    OPT_TEXT(
+        model, "m,model", "MODEL",
+        "model file; default: the leg of the exam's case, the file that the recording names, or "
+        "the bundled thigh"),
+    OPT_TEXT(cases, "cases", "DIR",
+             "where the files lie that the exam's case names; default: the cases that ship"),
     OPT_FLAG(images, "images",
              "make every image again as well and compare the hash of their pixels"),
     OPT_FLAG(recover, "recover",
@@ -38,6 +43,10 @@ static const app_option TABLE[] = {
         "multi-frame of DICOM, with one depth"),
     OPT_REAL(what.from_s, "from", "S", 0, 1e6, 1, "begin of the part to export, in seconds"),
     OPT_REAL(what.to_s, "to", "S", 0, 1e6, 1, "end of the part to export, in seconds"),
+    OPT_FLAG(
+        progress, "progress",
+        "say on standard error how much of an export is done, a line for each per cent, as for a "
+        "program that waits for it"),
     OPT_FLAG(
         json, "json",
         "print one JSON object: ticks, hash, recorded_hash, ended, same, checks, "
@@ -61,11 +70,42 @@ static int check(void *from) {
   return APP_OK;
 }
 
+static void print_check(const options *s, const sonde_replay_result *result, bool ended) {
+  char hash[20], recorded[20], image_hash[20];
+  snprintf(hash, sizeof hash, "%016llx", (unsigned long long)result->hash);
+  snprintf(recorded, sizeof recorded, "%016llx", (unsigned long long)result->recorded_hash);
+  snprintf(image_hash, sizeof image_hash, "%016llx", (unsigned long long)result->image_hash);
+  if (s->json) {
+    app_json_begin();
+    app_json("ticks:%lu hash:%s recorded_hash:%s ended:%hhd same:%hhd checks:%u different_tick:%lu",
+             result->ticks, hash, recorded, ended, result->same, result->checks,
+             result->different_tick);
+    if (s->images) {
+      app_json("images:%lu image_hash:%s same_images:%hhd", result->images, image_hash,
+               result->same_images);
+    }
+    app_json_end();
+  } else {
+    printf("%llu ticks replayed: state hash %s, recorded %s: %s\n",
+           (unsigned long long)result->ticks, hash,
+           ended ? recorded : "none (the file was cut off)",
+           result->same ? "the same" : "DIFFERENT");
+    if (s->images)
+      printf("%llu images made: hash %s: %s\n", (unsigned long long)result->images, image_hash,
+             result->same_images ? "the same" : "DIFFERENT");
+    if (result->checks || result->different_tick)
+      printf("%u states on the way compared%s", result->checks,
+             result->different_tick ? "; " : "\n");
+    if (result->different_tick)
+      printf("first difference at tick %llu\n", (unsigned long long)result->different_tick);
+  }
+}
+
 static int run(void *from) {
   options *s = from;
   assert(s->recording);
   sonde_error error = {0};
-  sonde_model *model = NULL;
+  if (s->progress) app_progress_lines();
   sonde_player *player = NULL;
   sonde_recording_info info = {0};
   sonde_replay_result result = {0};
@@ -78,8 +118,18 @@ static int run(void *from) {
   if (!status && !s->model && access(path, R_OK) != 0 &&
       app_bundled_model(bundled, sizeof bundled, searched, sizeof searched))
     path = bundled;
-  if (!status) status = sonde_limb_model_load(path, &model, &error);
-  sonde_player_def def = {.path = s->recording, .model = model, .recover = s->recover};
+  // An exam brings its case: the leg is made again as it was, with what the case has found in it.
+  char cases[1100];
+  bool known = false;
+  sonde_case_setup leg = {0};
+  const char *directory = s->cases;
+  if (!directory && app_data_directory("cases", cases, sizeof cases)) directory = cases;
+  if (!status)
+    status = exam_part_leg(s->recording, path, s->model, directory, &leg, &known, &error);
+  sonde_player_def def = {.path = s->recording,
+                          .model = leg.model,
+                          .findings = known ? &leg.findings : NULL,
+                          .recover = s->recover};
   if (!status) status = sonde_player_open(&def, &player, &error);
   if (!status) {
     sonde_progress progress = app_progress();
@@ -93,7 +143,7 @@ static int run(void *from) {
     app_progress_end();
   }
   sonde_player_close(player);
-  sonde_model_destroy(model);
+  sonde_case_setup_clear(&leg);
   if (status) return app_fail("replay", &error);
   const replay_export *w = &s->what;
   if (exports(s) && s->json) {
@@ -108,37 +158,7 @@ static int run(void *from) {
   if (w->video) printf("%u frames of film written to %s\n", w->film_frames, w->video);
   if (w->sequence) printf("%u tracked frames written to %s\n", w->tracked, w->sequence);
   if (exports(s)) return APP_OK;
-  {
-    char hash[20], recorded[20], image_hash[20];
-    snprintf(hash, sizeof hash, "%016llx", (unsigned long long)result.hash);
-    snprintf(recorded, sizeof recorded, "%016llx", (unsigned long long)result.recorded_hash);
-    snprintf(image_hash, sizeof image_hash, "%016llx", (unsigned long long)result.image_hash);
-    if (s->json) {
-      app_json_begin();
-      app_json(
-          "ticks:%lu hash:%s recorded_hash:%s ended:%hhd same:%hhd checks:%u different_tick:%lu",
-          result.ticks, hash, recorded, info.ended, result.same, result.checks,
-          result.different_tick);
-      if (s->images) {
-        app_json("images:%lu image_hash:%s same_images:%hhd", result.images, image_hash,
-                 result.same_images);
-      }
-      app_json_end();
-    } else {
-      printf("%llu ticks replayed: state hash %s, recorded %s: %s\n",
-             (unsigned long long)result.ticks, hash,
-             info.ended ? recorded : "none (the file was cut off)",
-             result.same ? "the same" : "DIFFERENT");
-      if (s->images)
-        printf("%llu images made: hash %s: %s\n", (unsigned long long)result.images, image_hash,
-               result.same_images ? "the same" : "DIFFERENT");
-      if (result.checks || result.different_tick)
-        printf("%u states on the way compared%s", result.checks,
-               result.different_tick ? "; " : "\n");
-      if (result.different_tick)
-        printf("first difference at tick %llu\n", (unsigned long long)result.different_tick);
-    }
-  }
+  print_check(s, &result, info.ended);
   return result.same && (!s->images || result.same_images) ? APP_OK : APP_FAILED;
 }
 

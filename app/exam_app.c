@@ -1,4 +1,5 @@
 // Practice, exams and replays behind one page: sessions, phases, requests.
+#include "exam_app_export.h"
 #include "exam_app_lesson.h"
 #include "page_token.h"
 
@@ -35,7 +36,8 @@ void exam_app_case_alias(const exam_app *app, const char *id, char alias[EXAM_AL
 
 // ---- sessions
 
-// The server must not show it any more. An exam that the log lacks by then gets its row.
+// The server must not show it any more. An exam that the log lacks by then gets its row, but not
+// one in the middle of which the patient turns.
 static void end_session(exam_app *app, sonde_session *session) {
   assert(session != NULL);
   sonde_error error = {0};
@@ -43,7 +45,8 @@ static void end_session(exam_app *app, sonde_session *session) {
   bool recorded = sonde_session_recording(session).recording;
   sonde_session_stop(session);
   if (sonde_session_destroy(session, &error)) sonde_page_tell(app->server, error.message);
-  if (recorded) exam_recover_log(app->exams, app->log, &found);
+  const bool turns = app->exam && app->exam->turns;
+  if (recorded && !turns) exam_recover_log(app->exams, app->log, &found);
 }
 
 void exam_app_end_session(exam_app *app) {
@@ -162,6 +165,7 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
     return put_note(app, SONDE_NOTE_HINT, NULL, 0, tick, error);
   }
   case SONDE_PAGE_WORKSHEET: return exam_app_write_sheet(app, request->entry, error);
+  case SONDE_PAGE_EXPORT: return exam_export_ask(app, request, error);
   case SONDE_PAGE_POSITION: return exam_turn(app, request->id, error);
   case SONDE_PAGE_FINISH_EXAM: return exam_finish(app, error);
   case SONDE_PAGE_LEAVE_EXAM: return exam_app_practice(app, error);
@@ -204,6 +208,7 @@ void exam_app_turn(exam_app *app) {
   }
   if (app->phase == EXAM_REPLAY) exam_replay_turn(app);
   if (app->phase == EXAM_FILM) exam_film_turn(app);
+  exam_export_turn(app);
   exam_app_watch_disk(app);
   exam_app_keep(app);
   double now_s = app_seconds(CLOCK_MONOTONIC);
@@ -300,6 +305,7 @@ sonde_status exam_app_destroy(exam_app *app, sonde_error *error) {
   if (!app) return SONDE_OK;
   if (app->exam) app->exam->retry_s = 0;
   exam_app_keep(app); // the last attempt
+  exam_export_end(app);
   sonde_page_stop(app->server);
   if (app->session) sonde_session_stop(app->session);
   sonde_status status = sonde_session_destroy(app->session, error);

@@ -183,8 +183,13 @@ sonde_status exam_turn(exam_app *app, const char *position, sonde_error *error) 
   pthread_mutex_lock(&app->lock);
   of->turns = false;
   pthread_mutex_unlock(&app->lock);
-  if (app->session) (void)sonde_session_start(app->session, NULL);
-  if (!app->session) (void)exam_app_practice(app, NULL);
+  if (app->session) {
+    (void)sonde_session_start(app->session, NULL);
+  } else { // the device could not move on: the exam ended with its last part
+    exam_recovered found;
+    exam_recover_log(app->exams, app->log, &found);
+    (void)exam_app_practice(app, NULL);
+  }
   return status;
 }
 

@@ -7,7 +7,8 @@
 
 #include <pthread.h>
 
-typedef struct exam_film exam_film; // exam_app_lesson.h
+typedef struct exam_film exam_film;     // exam_app_lesson.h
+typedef struct exam_export exam_export; // exam_app_export.h
 
 enum {
   EXAM_PATH = 4096,
@@ -131,6 +132,7 @@ struct exam_app {
   exam *exam;          // NULL: none
   exam_replay *replay; // NULL: none
   exam_film *film;     // NULL: none
+  exam_export *export; // NULL: none
   sonde_course course;
   double published_s;
   bool disk_told; // that the disk does not take the recording

@@ -1,5 +1,5 @@
 // A kept exam: any moment of it, played, with comments.
-#include "exam_app_parts.h"
+#include "exam_app_export.h"
 
 #include <assert.h>
 #include <math.h>
@@ -61,11 +61,9 @@ static sonde_status read_replay(exam_app *app, const char *id, exam_replay *repl
   exam_app_path(replay->directory, app->exams, id);
   exam_part_path(path, replay->directory, 1);
   snprintf(replay->id, sizeof replay->id, "%s", id);
-  sonde_json *setup = exam_read_setup(path);
-  const char *text = sonde_json_as_text(sonde_json_member(setup, "patient"));
-  sonde_status status = text ? sonde_case_parse(text, path, &patient, error) : SONDE_OK;
-  sonde_json_free(setup);
-  if (!text) // an exam from before the journal
+  bool known;
+  sonde_status status = exam_part_case(path, &patient, &known, error);
+  if (!status && !known) // an exam from before the journal
     status = sonde_case_load(exam_app_path(path, replay->directory, "case.yaml"), &patient, error);
   if (status) return status;
   snprintf(replay->title, sizeof replay->title, "%s", patient.title);
@@ -103,9 +101,7 @@ static sonde_status read_replay(exam_app *app, const char *id, exam_replay *repl
 
 sonde_status exam_replay_open(exam_app *app, const char *id, sonde_error *error) {
   assert(id != NULL);
-  // An id names one directory.
-  if (!id[0] || strspn(id, "abcdefghijklmnopqrstuvwxyz0123456789-") != strlen(id))
-    return app_error(error, SONDE_NOT_FOUND, "there is no such exam");
+  if (!exam_is_id(id)) return app_error(error, SONDE_NOT_FOUND, "there is no such exam");
   if (app->phase == EXAM_RUNNING)
     return app_error(error, SONDE_ARGUMENT, "finish or leave the exam before a replay");
   exam_replay *replay = calloc(1, sizeof *replay);

@@ -1,6 +1,6 @@
 // The worksheet of an exam: the images that the learner may store, entries from the page and from
 // the journal, files.
-#include "exam_app_parts.h"
+#include "exam_app_export.h"
 
 #include <assert.h>
 #include <ctype.h>
@@ -153,6 +153,16 @@ void exam_app_tell_sheet(exam_app *app) {
 
 // ---- files
 
+sonde_dicom_about exam_sheet_about(const exam *of, const sonde_sheet_picture *picture) {
+  return (sonde_dicom_about){.study = of->id,
+                             .patient_id = of->id,
+                             .date = of->date,
+                             .title = "Worksheet",
+                             .side = (char)toupper((unsigned char)of->sheet.side[0]),
+                             .series = 2,
+                             .number = picture->number};
+}
+
 sonde_status exam_sheet_save(const exam *of, sonde_error *error) {
   char path[EXAM_PATH];
   assert(of->directory[0] && of->protocol);
@@ -165,20 +175,16 @@ sonde_status exam_sheet_save(const exam *of, sonde_error *error) {
     if (access(picture_path(of, picture, path), F_OK) != 0)
       status = sonde_image_save_png(&picture->image, path, error);
     // For an archive, as secondary capture; it belongs to the study of the exam.
-    const sonde_dicom_about about = {.study = of->id,
-                                     .patient_id = of->id,
-                                     .date = of->date,
-                                     .title = "Worksheet",
-                                     .side = (char)toupper((unsigned char)of->sheet.side[0]),
-                                     .series = 2,
-                                     .number = picture->number};
+    const sonde_dicom_about about = exam_sheet_about(of, picture);
     memcpy(strrchr(path, '.'), ".dcm", 4);
     if (!status && picture->image.pixels && access(path, F_OK) != 0)
       status = sonde_image_save_dicom(path, &picture->image, &about, error);
     if (status) return status;
   }
-  sonde_status status = sonde_worksheet_save_csv(
-      &of->sheet, &of->plan, verdict, exam_app_path(path, of->directory, "worksheet.csv"), error);
+  sonde_status status = exam_sheet_archive(of, error);
+  if (!status)
+    status = sonde_worksheet_save_csv(&of->sheet, &of->plan, verdict,
+                                      exam_app_path(path, of->directory, "worksheet.csv"), error);
   if (status) return status;
   status =
       sonde_file_create(exam_app_path(path, of->directory, "worksheet.json"), &out.file, error);

@@ -30,7 +30,7 @@ bool app_interrupted(void) { return interrupted != 0; }
 
 // The line and what it says; the mutex guards all of it but `terminal`.
 typedef struct progress_line {
-  bool terminal, shown, beating, ending;
+  bool terminal, lines, shown, beating, ending;
   int percent; // -1: the share that is done is not known
   char what[64];
   double start_s;
@@ -39,6 +39,7 @@ typedef struct progress_line {
 } progress_line;
 
 static progress_line line = {.to = 1};
+static bool as_lines; // for another program that reads them
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t ended = PTHREAD_COND_INITIALIZER;
 
@@ -75,21 +76,25 @@ static void *beat(void *unused) {
 
 static bool report(double fraction, const char *what, void *user) {
   (void)user;
-  if (!line.terminal) return !interrupted;
+  if (!line.terminal && !line.lines) return !interrupted;
   double share = line.from + (line.to - line.from) * fmin(fmax(fraction, 0), 1);
   int percent = (int)(100 * share);
   pthread_mutex_lock(&mutex);
   bool changed = percent != line.percent || (what && strncmp(what, line.what, 63) != 0);
   line.percent = percent;
   if (what) snprintf(line.what, sizeof line.what, "%s", what);
-  if (changed || !line.shown) draw();
+  if (line.lines && changed) fprintf(stderr, "%d %%\n", percent);
+  if (!line.lines && (changed || !line.shown)) draw();
   pthread_mutex_unlock(&mutex);
   return !interrupted;
 }
 
+void app_progress_lines(void) { as_lines = true; }
+
 static void open_line(void) {
   app_progress_end();
-  line = (progress_line){.terminal = isatty(STDERR_FILENO) == 1,
+  line = (progress_line){.terminal = !as_lines && isatty(STDERR_FILENO) == 1,
+                         .lines = as_lines,
                          .percent = -1,
                          .to = 1,
                          .start_s = app_seconds(CLOCK_MONOTONIC)};

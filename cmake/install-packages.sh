@@ -64,6 +64,7 @@ test_packages() {
   need_command mpirun openmpi-bin # starts ranks of a cohort
   need_command dciodvfy dicom3tools # validates DICOM files
   need_command storescp dcmtk       # reads them, and is an archive to send them to
+  [[ -x /usr/sbin/Orthanc ]] || missing+=(orthanc) # an archive as hospitals run it
   installed libopenigtlink-dev || missing+=(libopenigtlink-dev) # a receiver of OpenIGTLink, and its
   installed openigtlink-examples || missing+=(openigtlink-examples) # source text
   need_command ccx calculix-ccx # a separate finite-element program that solves the same press
@@ -118,7 +119,17 @@ install_missing() {
   echo "== packages: installing ${missing[*]}"
   local apt=(as_root env DEBIAN_FRONTEND=noninteractive apt-get -q)
   "${apt[@]}" update || { sleep 5; "${apt[@]}" update; }
-  "${apt[@]}" install --no-install-recommends -y "${missing[@]}"
+  # Orthanc is wanted as a program that a test starts. Its package would start a service, now and at every
+  # boot, and fail where none can be started.
+  local policy=/usr/sbin/policy-rc.d code=0 own=
+  if [[ " ${missing[*]} " == *" orthanc "* && ! -e $policy ]]; then
+    own=$policy
+    as_root sh -c "printf '#!/bin/sh\nexit 101\n' >$policy && chmod 755 $policy"
+  fi
+  "${apt[@]}" install --no-install-recommends -y "${missing[@]}" || code=$?
+  [[ -z $own ]] || as_root rm -f "$own"
+  [[ " ${missing[*]} " != *" orthanc "* ]] || as_root update-rc.d orthanc disable || true
+  return "$code"
 }
 
 for group in "$@"; do

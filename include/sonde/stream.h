@@ -42,6 +42,7 @@ typedef enum sonde_page_ask {
   SONDE_PAGE_START_LESSON, /**< id (lesson), turn, name (trainee) */
   SONDE_PAGE_DEMONSTRATE,  /**< id (lesson) */
   SONDE_PAGE_NEXT,         /**< of a demonstration: its words are read */
+  SONDE_PAGE_EXPORT,       /**< id (exam), text (what, may be empty), turn (part, from 1) */
   SONDE_PAGE_ASKS
 } sonde_page_ask;
 
@@ -63,6 +64,7 @@ typedef enum sonde_page_topic {
   SONDE_PAGE_EXAMS,
   SONDE_PAGE_REPLAY,
   SONDE_PAGE_SHEET,  /**< the worksheet of the exam */
+  SONDE_PAGE_FILES,  /**< what can be downloaded of a kept exam */
   SONDE_PAGE_STATUS, /**< not sent: GET /status.json */
   SONDE_PAGE_TOPICS
 } sonde_page_topic;

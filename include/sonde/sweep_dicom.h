@@ -1,8 +1,8 @@
 /**
  * @file sweep_dicom.h
  * Pictures as DICOM files: a tracked sequence as Ultrasound Multi-frame Image, a single picture as
- * Secondary Capture, both Explicit VR Little Endian, 8-bit grey, with a calibrated region. Files
- * are written, not read (docs/dicom.md).
+ * Secondary Capture, both 8-bit grey, with a calibrated region; findings as Comprehensive SR. All
+ * are Explicit VR Little Endian. Files are written, not read (docs/dicom.md).
  */
 #ifndef SONDE_SWEEP_DICOM_H
 #define SONDE_SWEEP_DICOM_H
@@ -38,6 +38,58 @@ SONDE_API sonde_status sonde_sequence_save_dicom(const char *path, const sonde_s
 /** Writes one picture of known width and height. @return as sonde_file_create() @thread owner */
 SONDE_API sonde_status sonde_image_save_dicom(const char *path, const sonde_image *image,
                                               const sonde_dicom_about *about, sonde_error *error);
+
+/* ---- structured reports -------------------------------------------------------------------- */
+
+/** Scheme of the house's own codes. */
+#define SONDE_DICOM_SCHEME "99SONDE"
+
+/** A coded word: at most 16 characters, the scheme that has it (DCM, SCT, UCUM,
+ *  SONDE_DICOM_SCHEME), what it means (at most 64 characters). */
+typedef struct sonde_dicom_code {
+  const char *value, *scheme, *meaning;
+} sonde_dicom_code;
+
+typedef enum sonde_dicom_kind {
+  SONDE_DICOM_CONTAINER, /**< what stands below it belongs together */
+  SONDE_DICOM_TEXT,
+  SONDE_DICOM_CODE,
+  SONDE_DICOM_NUMBER,
+  SONDE_DICOM_PICTURE /**< a picture that sonde_image_save_dicom() wrote */
+} sonde_dicom_kind;
+
+/** How an item stands to the one that it is below. */
+typedef enum sonde_dicom_relation {
+  SONDE_DICOM_CONTAINS,
+  SONDE_DICOM_OBSERVED, /**< who or what observed */
+  SONDE_DICOM_MODIFIES, /**< the name above is meant so */
+  SONDE_DICOM_PROPERTY,
+  SONDE_DICOM_ACQUIRED /**< how the picture above was taken */
+} sonde_dicom_relation;
+
+/** An item of a report; texts are borrowed. */
+typedef struct sonde_dicom_item {
+  uint32_t level; /**< 0: the report itself, the first and no other; it is below the nearest item
+                       before it of a lower level, of at most one less */
+  sonde_dicom_relation relation;
+  sonde_dicom_kind kind;
+  sonde_dicom_code name;
+  sonde_dicom_code code; /**< of a CODE; the unit (UCUM) of a NUMBER */
+  double number;
+  const char *text;                     /**< of a TEXT: UTF-8, not empty */
+  const sonde_image *image;             /**< of a PICTURE, and */
+  const sonde_dicom_about *image_about; /**< what was said about it */
+} sonde_dicom_item;
+
+/**
+ * Writes findings as Comprehensive SR, complete and not verified. Equal input gives equal bytes.
+ * @param items [count] depth first, at least two
+ * @param about with a date and a time
+ * @return ARGUMENT without a date; as sonde_file_create() @thread owner
+ */
+SONDE_API sonde_status sonde_report_save_dicom(const char *path, const sonde_dicom_item *items,
+                                               uint32_t count, const sonde_dicom_about *about,
+                                               sonde_error *error);
 
 #ifdef __cplusplus
 }

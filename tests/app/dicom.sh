@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # A recording as DICOM ultrasound multi-frame: the pixels of the MetaImage, no error by dciodvfy, and sent by
-# sonde send to dcmtk's storescp. What is not installed is said.
+# sonde send to dcmtk's storescp; a worksheet as structured report. What is not installed is said.
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 source "$here/common.sh"
 trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$work"' EXIT
@@ -58,6 +58,34 @@ s = socket.create_server(("127.0.0.1", 0)); print(s.getsockname()[1])')
 else
   wrong "dcmtk is not there, an archive to send to"
 fi
+# A worksheet's report: no error by dciodvfy, and dsrdump finds what was written where it may stand.
+mkdir exams protocols
+printf '%s\n' 'sonde_protocol: 1' 'id: one' 'title: One' 'text: One.' 'places:' \
+  '- {title: Groin, at: {station: common_femoral}}' '- {title: Knee, at: {station: popliteal}, position: prone_bent}' >protocols/one.yaml
+checks=$((checks + 1))
+status=0
+EXAM_ONCE_DIR=$PWD/exams EXAM_ONCE_MODEL=$MODEL EXAM_ONCE_CASES=$LIBRARY/cases EXAM_ONCE_PROTOCOLS=$PWD/protocols \
+  EXAM_ONCE_SECONDS=0.2 EXAM_ONCE_TICKS=200 EXAM_ONCE_ROOM_AFTER=60 EXAM_ONCE_SHEET=1 timeout 900 "$EXAM_ONCE" run >"$out" 2>"$err" || status=$?
+((status == 0)) || wrong "the exam: exit $status: $(<"$out")"
+report=$(echo exams/*/worksheet.dcm)
+checks=$((checks + 1))
+dciodvfy "$report" >"$out" 2>&1 || true
+{ grep -q '^ComprehensiveSR' "$out" && ! grep -q '^Error' "$out"; } || wrong "dciodvfy on the report: $(<"$out")"
+dsrdump +Pl +Pc "$report" >"$out" 2>"$err" || wrong "dsrdump: $(<"$err")"
+! grep -v 'VR checker does not support this Specific Character Set' "$err" || wrong "dsrdump: $(<"$err")"
+for item in '125100' 'has concept mod CODE:(363698007' 'contains CODE:(121071.*not_compressible' \
+  'has properties CODE:(age.*acute' 'has properties NUM:(reflux_time.*0.8' 'Größe: 9 mm' \
+  'contains IMAGE:(with' 'has acq context NUM:(force' 'contains CODE:(121077.*proximal'; do
+  checks=$((checks + 1))
+  grep -q -- "$item" "$out" || wrong "the report does not say '$item': $(<"$out")"
+done
+# Its pictures are the files beside it.
+dcmdump +P 0008,1155 "$report" >named.txt 2>/dev/null
+for picture in exams/*/worksheet-*.dcm; do
+  checks=$((checks + 1))
+  uid=$(dcmdump +P 0008,0018 "$picture" 2>/dev/null | grep -o '2\.25\.[0-9]*')
+  grep -qF "[$uid]" named.txt || wrong "the report does not name $picture"
+done
 checks=$((checks + 1))
 status=0
 PATH=/nowhere "$SONDE" send a.dcm --to localhost:104 2>"$err" >"$out" || status=$?

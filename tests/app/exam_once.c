@@ -1,8 +1,10 @@
 // exam_once run [...]: one exam as the page would drive it, with what the program was
-// told to be on the disk on standard output, one word a line: begun, decided (twice), kept.
+// told to be on the disk on standard output, one word a line: begun, decided (twice), kept, and
+// what the log has of it: scored or interrupted.
 // exam_once notes FILE: how many decisions a journal has.
-// Environment: EXAM_ONCE_DIR, _MODEL, _CASES, _PROTOCOLS, _SECONDS, _ROOM_AFTER (the program goes
-// on so long with a result that is not on the disk).
+// Environment, EXAM_ONCE_...: DIR, MODEL, CASES, PROTOCOLS, COURSE, SECONDS, ROOM_AFTER (the
+// program goes on so long with a result that is not on the disk), SHEET (a worksheet is written as
+// well), TICKS (each part goes on until so many ticks are done and seen).
 #include "exam_app_lesson.h"
 
 #include <stdio.h>
@@ -40,6 +42,17 @@ static void turn_for(exam_app *app, double seconds) {
   } while (app_seconds(CLOCK_MONOTONIC) < until_s);
 }
 
+// However long the machine takes for it.
+static void turn_until_seen(exam_app *app, uint32_t part) {
+  const uint64_t ticks = strtoull(setting("EXAM_ONCE_TICKS"), NULL, 10);
+  for (bool seen = ticks == 0; !seen && app->exam && app->phase == EXAM_RUNNING;) {
+    turn_for(app, 0);
+    pthread_mutex_lock(&app->lock);
+    seen = app->exam && app->exam->watched_part >= part && app->exam->seen_tick >= ticks;
+    pthread_mutex_unlock(&app->lock);
+  }
+}
+
 static void ask(exam_app *app, const sonde_page_request *request) {
   pthread_mutex_lock(&app->lock);
   app->request[(app->request_first + app->request_count++) % EXAM_REQUESTS] = *request;
@@ -65,6 +78,36 @@ static void decide(exam_app *app, const char *word) {
   if (ask_noted(app, &request)) say("decided");
 }
 
+// A picture of now in the worksheet.
+static void store_picture(exam_app *app) {
+  sonde_error error = {0};
+  uint64_t tick = 0;
+  for (int k = 0; k < 20000 && !tick; ++k) {
+    turn_for(app, 0);
+    pthread_mutex_lock(&app->lock);
+    tick = app->exam->watched_part == app->exam->part ? app->exam->seen_tick : 0;
+    pthread_mutex_unlock(&app->lock);
+  }
+  char entry[100];
+  snprintf(entry, sizeof entry, "{\"type\":\"worksheet\",\"picture\":%llu,\"place\":0}",
+           (unsigned long long)tick);
+  sonde_status stored = exam_app_write_sheet(app, entry, &error);
+  printf("stores a picture: %s\n", stored ? error.message : "yes");
+}
+
+// A clot with all that can be said of it, and a conclusion.
+static void write_sheet(exam_app *app) {
+  static const char *const ENTRIES[] = {
+      "{\"type\":\"worksheet\",\"place\":0,\"finding\":\"not_compressible\",\"age\":\"acute\","
+      "\"kind\":\"occlusive\",\"reflux\":\"present\",\"reflux_s\":0.8,\"text\":\"Größe: 9 mm\"}",
+      "{\"type\":\"worksheet\",\"conclusion\":\"proximal\",\"deep\":[0,0],"
+      "\"text\":\"Fresh clot.\\nTreat.\"}"};
+  sonde_error error = {0};
+  store_picture(app);
+  for (int k = 0; k < 2; ++k)
+    if (exam_app_write_sheet(app, ENTRIES[k], &error)) say(error.message);
+}
+
 static bool is_kept(const exam_app *app) {
   return app->exam && app->exam->in_journal && app->exam->filed && app->exam->logged;
 }
@@ -82,19 +125,28 @@ static int examine(exam_app *app) {
   }
   say("begun");
   turn_for(app, seconds / 2);
+  turn_until_seen(app, 1);
   decide(app, "clot");
+  if (setting("EXAM_ONCE_SHEET")[0]) write_sheet(app);
   ask_noted(app, &(sonde_page_request){.ask = SONDE_PAGE_HINT});
   ask(app, &(sonde_page_request){.ask = SONDE_PAGE_POSITION, .id = "prone_bent"});
   turn_for(app, seconds / 2);
+  turn_until_seen(app, 2);
   if (!app->exam) { // the second part could not be begun: the exam is over, the first part is kept
     fprintf(stderr, "exam_once: the page is told: %s\n", app->message);
     return APP_FAILED;
   }
   decide(app, "compressible");
+  if (setting("EXAM_ONCE_SHEET")[0]) store_picture(app);
   exam_finish(app, &error);
   if (is_kept(app)) say("kept");
   turn_for(app, is_kept(app) ? 0.05 : room_s);
   if (!is_kept(app)) fprintf(stderr, "exam_once: the page is told: %s\n", app->message);
+  sonde_log_entry *entries = NULL;
+  uint32_t count = 0;
+  if (is_kept(app) && !sonde_exam_log_list(app->log, NULL, 1, &entries, &count, &error) && count)
+    say(entries[0].interrupted ? "interrupted" : "scored");
+  sonde_free(entries);
   return is_kept(app) ? APP_OK : APP_FAILED;
 }
 
@@ -127,19 +179,7 @@ static int teach(exam_app *app) {
   }
   printf("practises: %s, repetition %u, %s, film %s\n", app->exam->protocol->id,
          app->exam->turn + 1, app->exam->guidance, app->film ? "goes on" : "is over");
-  // A picture of the worksheet.
-  uint64_t tick = 0;
-  for (int k = 0; k < 20000 && !tick; ++k) {
-    turn_for(app, 0);
-    pthread_mutex_lock(&app->lock);
-    tick = app->exam->seen_tick;
-    pthread_mutex_unlock(&app->lock);
-  }
-  char entry[100];
-  snprintf(entry, sizeof entry, "{\"type\":\"worksheet\",\"picture\":%llu,\"place\":0}",
-           (unsigned long long)tick);
-  sonde_status stored = exam_app_write_sheet(app, entry, &error);
-  printf("stores a picture: %s\n", stored ? error.message : "yes");
+  store_picture(app);
   exam_finish(app, &error);
   return APP_OK;
 }

@@ -84,7 +84,9 @@ static void without_the_token_there_is_only_the_page(void **state) {
       "Authorization: Bearer 00112233445566778899aabbccddeeff0\r\n",
       "Authorization: Bearer 10112233445566778899aabbccddeeff\r\n",
       "Sec-WebSocket-Protocol: 00112233445566778899aabbccddeeff\r\n"};
-  static const char *const DATA[] = {"/status.json", "/report/2026-a1", "/exam/2026-a1.json",
+  static const char *const DATA[] = {"/export/2026-a1/1.igs.mha", "/worksheet/2026-a1.dcm",
+                                     "/worksheet/2026-a1/1.dcm",  "/status.json",
+                                     "/report/2026-a1",           "/exam/2026-a1.json",
                                      "/exam/2026-a1.csv"};
   for (size_t i = 0; i < SONDE_COUNT_OF(WRONG); ++i)
     for (size_t k = 0; k < SONDE_COUNT_OF(DATA); ++k)

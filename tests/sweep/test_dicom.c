@@ -128,7 +128,7 @@ static void others_read_it(uint32_t frames) {
   bool any = false;
   while (fgets(line, sizeof line, said)) {
     if (strncmp(line, "Error", 5) == 0) fail_msg("dciodvfy: %s", line);
-    any |= strstr(line, "Image") != NULL;
+    any |= strstr(line, "Image") || strstr(line, "ComprehensiveSR");
   }
   pclose(said);
   assert_true(any); // it said what kind of file it is
@@ -231,6 +231,62 @@ static void a_picture_is_a_capture(void **state) {
   others_read_it(1);
 }
 
+static void findings_are_a_report(void **state) {
+  (void)state;
+  uint8_t pixels[WIDTH * HEIGHT] = {7};
+  const sonde_image image = {
+      .width = WIDTH, .height = HEIGHT, .width_m = 0.046, .height_m = 0.017, .pixels = pixels};
+  const sonde_dicom_about about = {.study = "exam-7", .date = "2026-11-27T22:05:09", .series = 3};
+  const sonde_dicom_about picture = {.study = "exam-7", .series = 2};
+  sonde_dicom_item items[] = {
+      {.kind = SONDE_DICOM_CONTAINER, .name = {"125100", "DCM", "Report"}},
+      {.level = 1, .kind = SONDE_DICOM_CONTAINER, .name = {"121070", "DCM", "Findings"}},
+      {.level = 2,
+       .kind = SONDE_DICOM_PICTURE,
+       .name = {"with", SONDE_DICOM_SCHEME, "With"},
+       .image = &image,
+       .image_about = &picture},
+      {.level = 3,
+       .relation = SONDE_DICOM_ACQUIRED,
+       .kind = SONDE_DICOM_NUMBER,
+       .name = {"force", SONDE_DICOM_SCHEME, "Force"},
+       .number = 2.5,
+       .code = {"N", "UCUM", "newton"}},
+      {.level = 1,
+       .kind = SONDE_DICOM_TEXT,
+       .name = {"121073", "DCM", "Impression"},
+       .text = "One\ttwo."}};
+  const uint32_t all = sizeof items / sizeof *items;
+  sonde_error error = {0};
+  char instance[64], study[64];
+  uint32_t length = 0;
+  assert_int_equal(sonde_image_save_dicom(path, &image, &picture, NULL), SONDE_OK);
+  load();
+  memcpy(instance, find(0x00080018, &length), 30);
+  memcpy(study, find(0x0020000d, &length), 30);
+  assert_int_equal(sonde_report_save_dicom(path, items, all, &about, NULL), SONDE_OK);
+  load();
+  has_text(0x00080016, "1.2.840.10008.5.1.4.1.1.88.33");
+  has_text(0x00080060, "SR");
+  has_text(0x00080023, "20261127");
+  has_text(0x0040a491, "COMPLETE");
+  assert_memory_equal(find(0x0020000d, &length), study, 30);
+  assert_memory_equal(find(0x00081155, &length), instance, 30); // the picture's own file
+  has_text(0x0040a30a, "2.5");
+  has_text(0x0040a160, "One two."); // no control characters
+  assert_null(find(0x7fe00010, &length));
+  memcpy(instance, find(0x00080018, &length), 30);
+  // What stands elsewhere is another report.
+  items[4].level = 2;
+  assert_int_equal(sonde_report_save_dicom(path, items, all, &about, NULL), SONDE_OK);
+  load();
+  assert_memory_not_equal(find(0x00080018, &length), instance, 30);
+  others_read_it(0);
+  const sonde_dicom_about bare = {.study = "exam-7"};
+  assert_int_equal(sonde_report_save_dicom(path, items, all, &bare, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "needs a date"));
+}
+
 static void what_does_not_fit_is_refused(void **state) {
   (void)state;
   sonde_sequence s;
@@ -252,6 +308,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_sequence_is_multi_frame),
       cmocka_unit_test(a_picture_is_a_capture),
+      cmocka_unit_test(findings_are_a_report),
       cmocka_unit_test(what_does_not_fit_is_refused),
   };
   int failed = cmocka_run_group_tests(tests, NULL, NULL);

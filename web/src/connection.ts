@@ -126,6 +126,9 @@ export class Connection {
   listExams(): void {
     this.send({ type: "list_exams" });
   }
+  exportExam(exam: string, what: string, part: number): void {
+    this.send({ type: "export", exam, what, part });
+  }
   openReplay(exam: string): void {
     this.send({ type: "open_replay", exam });
   }

@@ -27,7 +27,7 @@ export class HistoryDialog {
   private list: ExamEntry[] = [];
   private trainee = "";
 
-  constructor(private readonly replay: (exam: string) => void) {}
+  constructor(private readonly replay: (exam: string) => void, private readonly files: (exam: ExamEntry) => void) {}
 
   /** Opens with what is known; the list comes with the next message. */
   open(trainee: string): void {
@@ -103,7 +103,9 @@ export class HistoryDialog {
     const replay = button("Replay", () => (this.box.close(), this.replay(e.id)));
     replay.setAttribute("aria-label", `Replay of ${e.title}, ${when}`);
     replay.disabled = !e.recording;
-    does.append(report, replay);
+    const files = button("Files", () => this.files(e));
+    files.setAttribute("aria-label", `Files of ${e.title}, ${when}`);
+    does.append(report, replay, files);
     row.append(make("td", "", when), make("td", "", e.title), make("td", "", e.trainee), make("td", "", label(e.protocol)), score, make("td", "", minutes(e.seconds)), does);
     return row;
   }

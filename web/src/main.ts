@@ -11,6 +11,7 @@ import { FilmBar } from "./film";
 import { ExamBar } from "./exam";
 import { ForceBar } from "./force_bar";
 import { GateTools } from "./gate";
+import { ExportDialog } from "./exports";
 import { HistoryDialog } from "./history";
 import { Input } from "./input";
 import { limbWords } from "./limb";
@@ -79,6 +80,7 @@ class App {
   private readonly filmBar: FilmBar;
   private readonly start: StartDialog;
   private readonly result: ResultDialog;
+  private readonly exports: ExportDialog;
   private readonly history: HistoryDialog;
   private readonly coach = new Coach();
   private readonly rates = new Rates();
@@ -148,7 +150,8 @@ class App {
       comment: () => this.replayBar.write(),
       worksheet: () => this.worksheet.summary(),
     });
-    this.history = new HistoryDialog((exam) => connection.openReplay(exam));
+    this.exports = new ExportDialog({ ask: (exam, what, part) => connection.exportExam(exam, what, part) });
+    this.history = new HistoryDialog((exam) => connection.openReplay(exam), (exam) => this.exports.open(exam));
     this.input = this.wireInput();
     this.wireButtons();
     startTheme();
@@ -219,6 +222,7 @@ class App {
     else if (message.type === "controls") this.setControls(message);
     else if (message.type === "exam") this.setExam(message);
     else if (message.type === "exams") this.history.fill(message.list);
+    else if (message.type === "export") this.exports.fill(message);
     else if (message.type === "replay") this.setReplay(message);
     else if (message.type === "worksheet") this.setSheet(message);
     else if (message.type === "error") this.say(message.message);
@@ -324,6 +328,7 @@ class App {
   private begin(before: Phase): void {
     remember("trained", "yes");
     this.start.close();
+    this.exports.close();
     this.history.close();
     this.traces.clear();
     find("hint").classList.add("gone");

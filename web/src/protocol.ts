@@ -1,5 +1,6 @@
 // Messages of docs/page_protocol.md: types, decoding of the binary ones. Lengths are mm.
 
+import type { ExportMessage } from "./exports";
 import { type Face, FLAT } from "./lines";
 import type { SheetMessage } from "./worksheet";
 
@@ -353,6 +354,7 @@ export type TextMessage =
   | Exam
   | Replay
   | SheetMessage
+  | ExportMessage
   | { type: "exams"; list: ExamEntry[] }
   | { type: "error"; message: string }
   | { type: "pong"; id: number };

@@ -2,8 +2,12 @@
 #include "stream/page_data.h"
 #include "stream/page_server.h"
 
+#include <fcntl.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 // host[:port]; the port may be missing only when it is the default of HTTP.
 static bool is_local(const char *authority, uint16_t port) {
@@ -31,11 +35,11 @@ static const char PAGE_POLICY[] =
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 // Body of an answer. `policy` NULL: the page's own; `owned` is freed when all is sent, NULL:
-// nothing.
+// nothing; `mapped` bytes of it are a file's, 0: it is allocated.
 typedef struct page_body {
   const char *type, *policy;
   const void *bytes;
-  size_t size;
+  size_t size, mapped;
   void *owned;
   bool gzip;
 } page_body;
@@ -61,6 +65,7 @@ static void send_head(page_out *out, int code, const char *reason, const page_bo
   out->body = body->bytes;
   out->body_size = body->size;
   out->owned = body->owned;
+  out->mapped = body->mapped;
   out->done = 0;
 }
 
@@ -136,6 +141,11 @@ static const exam_document DOCUMENTS[] = {
     {"/worksheet/", ".json", "worksheet.json", "application/json", NULL},
     {"/worksheet/", ".csv", "worksheet.csv", "text/csv; charset=utf-8", NULL},
     {"/worksheet/", ".png", "worksheet-", "image/png", NULL}, // ID/NUMBER
+    {"/worksheet/", ".dcm", "worksheet-", "application/dicom", NULL},
+    {"/worksheet/", ".dcm", "worksheet.dcm", "application/dicom", NULL},
+    {"/export/", ".dcm", "export-", "application/dicom", NULL}, // of gigabytes
+    {"/export/", ".igs.mha", "export-", "application/octet-stream", NULL},
+    {"/export/", ".seq.nrrd", "export-", "application/octet-stream", NULL},
 };
 
 // False when the address is not one of an exam.
@@ -172,8 +182,20 @@ static bool answer_document(const sonde_page_server *server, const page_request 
     char path[640], *bytes = NULL;
     page_body body = {.type = d->type, .policy = d->policy};
     snprintf(path, sizeof path, "%s/%s/%s", server->exams_directory, id, name);
+    const int file =
+        known && strcmp(d->prefix, "/export/") == 0 ? open(path, O_RDONLY | O_CLOEXEC) : -1;
+    struct stat facts;
+    if (file >= 0 && fstat(file, &facts) == 0 && S_ISREG(facts.st_mode) && facts.st_size > 0) {
+      // A sequence is not read, but mapped: it was given its name when it was whole.
+      body.size = body.mapped = (size_t)facts.st_size;
+      void *map = mmap(NULL, body.size, PROT_READ, MAP_PRIVATE, file, 0);
+      body.bytes = body.owned = map == MAP_FAILED ? NULL : map;
+    }
+    if (file >= 0) close(file);
     if (!known) {
       send_stranger(out);
+    } else if (body.owned) {
+      send_head(out, 200, "OK", &body);
     } else if (sonde_file_load(path, &bytes, &body.size, NULL)) {
       send_refusal(out, 404, "Not Found", "there is no such exam\n");
     } else {

@@ -13,14 +13,16 @@
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
 #include <unistd.h>
 
 enum {
-  ADMITTED = 64,    // new connections in one round
-  ROUND_MS = 100,   // longest wait: the stages' ends are looked at ten times a second
-  THROWN = 1 << 16, // bytes read and thrown away in one round, of a connection that ends
+  ADMITTED = 64,               // new connections in one round
+  ROUND_MS = 100,              // longest wait: the stages' ends are looked at ten times a second
+  LEAST_BYTES_PER_S = 1 << 20, // that a client takes of a file that is mapped
+  THROWN = 1 << 16,            // bytes read and thrown away in one round, of a connection that ends
 };
 
 sonde_status page_net_open(sonde_page_server *server, uint16_t port, sonde_error *error) {
@@ -38,9 +40,12 @@ static void enter(page_connection *c, page_stage stage) {
 }
 
 static void clear_out(page_connection *c) {
-  sonde_free(c->out.owned);
+  if (c->out.mapped)
+    munmap(c->out.owned, c->out.mapped);
+  else
+    sonde_free(c->out.owned);
   c->out.owned = NULL;
-  c->out.head_size = c->out.body_size = c->out.done = 0;
+  c->out.mapped = c->out.head_size = c->out.body_size = c->out.done = 0;
 }
 
 static void drop(page_connection *c) {
@@ -266,8 +271,10 @@ static void *run(void *argument) {
       if (c->socket >= 0 && listens(c) && (events & (POLLIN | POLLHUP | POLLERR))) hear(server, c);
       if (c->socket >= 0) {
         // Ends a connection that stays too long in its stage, and pings a client that is silent.
+        // A large file takes its time: at least LEAST_BYTES_PER_S.
+        const double sends_s = (double)c->out.mapped / LEAST_BYTES_PER_S;
         const double most_s[] = {[PAGE_ASKS] = patience.ask_s,
-                                 [PAGE_ANSWERED] = patience.answer_s,
+                                 [PAGE_ANSWERED] = patience.answer_s + sends_s,
                                  [PAGE_ENDS] = patience.end_s};
         if (c->stage != PAGE_TALKS) {
           if (now_s - c->stage_s > most_s[c->stage]) drop(c);

@@ -186,6 +186,11 @@ static void read_request(reader *r, sonde_page_ask ask, sonde_page_request *q) {
     q->turn = read_id(r, "turn");
     break;
   case SONDE_PAGE_DEMONSTRATE: read_text(r, "lesson", 1, 47, q->id, sizeof q->id); break;
+  case SONDE_PAGE_EXPORT:
+    read_text(r, "exam", 1, 63, q->id, sizeof q->id);
+    read_text(r, "what", 0, 15, q->text, sizeof q->text);
+    q->turn = sonde_json_member(r->root, "part") ? read_id(r, "part") : 1;
+    break;
   case SONDE_PAGE_POSITION: read_text(r, "position", 1, 31, q->id, sizeof q->id); break;
   case SONDE_PAGE_OPEN_REPLAY: read_text(r, "exam", 1, 63, q->id, sizeof q->id); break;
   case SONDE_PAGE_SEEK: q->time_s = read_time(r); break;
@@ -204,10 +209,10 @@ static void read_request(reader *r, sonde_page_ask ask, sonde_page_request *q) {
 
 // Requests of the program after the page's own commands, in the order of sonde_page_ask.
 static const char *const TYPES[] = {
-    "goal",     "controls",    "stop",       "resume",       "ack",         "ping",
-    "gel",      "role",        "hand",       "start_exam",   "decide",      "hint",
-    "position", "finish_exam", "leave_exam", "list_exams",   "open_replay", "seek",
-    "play",     "comment",     "worksheet",  "start_lesson", "demonstrate", "next"};
+    "goal",         "controls",    "stop",        "resume", "ack",  "ping",     "gel",
+    "role",         "hand",        "start_exam",  "decide", "hint", "position", "finish_exam",
+    "leave_exam",   "list_exams",  "open_replay", "seek",   "play", "comment",  "worksheet",
+    "start_lesson", "demonstrate", "next",        "export"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
 sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,

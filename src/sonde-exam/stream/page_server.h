@@ -57,7 +57,8 @@ typedef struct page_out {
   char head[PAGE_REPLY_HEAD];
   size_t head_size, body_size, done; // bytes; `done` counts head and body
   const void *body;
-  void *owned; // freed when all is sent
+  void *owned;   // freed when all is sent
+  size_t mapped; // bytes of `owned` when it is a file in memory; 0: it is allocated
 } page_out;
 
 typedef struct page_client {
