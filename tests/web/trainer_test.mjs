@@ -11,6 +11,7 @@ import { REFLUX_S } from "./mock_thigh.mjs";
 
 const [, , webDir, outDir] = process.argv;
 const SKIPPED = 77;
+const WIDE_MM = 60; // the mock's image
 const CLOSED_MM = 15; // closes the mock's vein
 const SMALL = { width: 1024, height: 700 };
 if (!browserPath) {
@@ -462,17 +463,17 @@ async function testFan(page, mock) {
   const box = [-14, 14, 10, 40];
   Object.assign(mock.thigh.controls, { colour: "velocity", colour_box_mm: box, colour_steer_deg: undefined, gate: true, gate_mm: [20, 30], gate_steer_deg: undefined });
   await page.locator("#gel-put").click();
-  const shape = () => page.evaluate(() => {
+  const shape = () => page.evaluate((wide) => {
     const svg = document.querySelector(".pane:not([hidden]) .doppler");
-    const scale = svg.viewBox.baseVal.width / window.sonde.image_mm[0];
+    const scale = svg.viewBox.baseVal.width / wide;
     const points = (name) => (document.querySelector(`.pane:not([hidden]) ${name}`).getAttribute("d") ?? "").match(/-?[0-9.]+ -?[0-9.]+/g)?.map((p) => p.split(" ").map((v) => v / scale)) ?? [];
-    return { box: points(".doppler .box"), beam: points(".gate .beam"), wide: window.sonde.image_mm[0] };
-  });
+    return { box: points(".doppler .box"), beam: points(".gate .beam") };
+  }, WIDE_MM);
   await page.waitForFunction(() => document.querySelector(".pane:not([hidden]) .doppler .box").getAttribute("d")?.split("L").length > 20);
   await page.waitForFunction(() => document.querySelector(".pane:not([hidden]) .gate .beam").getAttribute("d"));
   const seen = await shape();
   const top = mock.thigh.face.top_mm;
-  const at = (along, depth) => [(radius + depth) * Math.sin(along / radius) + seen.wide / 2, (radius + depth) * Math.cos(along / radius) - radius - top];
+  const at = (along, depth) => [(radius + depth) * Math.sin(along / radius) + WIDE_MM / 2, (radius + depth) * Math.cos(along / radius) - radius - top];
   const near = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]) < 0.1;
   check([[-14, 10], [14, 10], [0, 10], [14, 40], [-14, 40], [0, 40]].every((p) => seen.box.some((q) => near(q, at(...p)))), "the colour box is a sector of the fan");
   check(near(seen.beam[0], at(20, 0)) && near(seen.beam[1], at(20, 28.5)), "the gate lies on its line");
@@ -483,6 +484,9 @@ async function testFan(page, mock) {
   await page.waitForFunction(() => window.sonde.controls.gate_mm[1] === 30.5 && window.sonde.controls.gate_mm[0] === 20);
   await picture(page, path.join(outDir, "fan.png"));
   mock.thigh.face = undefined;
+  Object.assign(mock.thigh.controls, { colour: undefined, gate: undefined });
+  await page.locator("#gel-put").click();
+  await page.waitForFunction(() => document.getElementById("pulsed").hidden);
 }
 
 /** Two fingers that go up press. */
