@@ -119,7 +119,10 @@ void exam_export_turn(exam_app *app) {
     e->child = 0;
     e->ready = WIFEXITED(ended) && WEXITSTATUS(ended) == 0 && !e->cancelled;
     if (e->ready) e->percent = 100, e->message[0] = 0;
-    if (!e->ready) (void)unlink(export_path(app, path)); // a part of it may be there
+    if (!e->ready) {
+      (void)unlink(export_path(app, path));
+      (void)sonde_file_remove_abandoned(path);
+    }
     if (e->cancelled)
       snprintf(e->message, sizeof e->message, "The export was cancelled.");
     else if (!e->ready && !e->message[0])
@@ -128,10 +131,11 @@ void exam_export_turn(exam_app *app) {
   if (over || e->percent != before) tell(app);
 }
 
+// At once: what it had begun is removed when it is gone.
 static void cancel(exam_export *e) {
   if (!e->child) return;
   e->cancelled = true;
-  kill(e->child, SIGTERM);
+  kill(e->child, SIGKILL);
 }
 
 // The file of the export before goes.
@@ -214,6 +218,7 @@ void exam_export_end(exam_app *app) {
     (void)app_await(e->child, false);
     close(e->said);
     e->child = 0;
+    (void)sonde_file_remove_abandoned(export_path(app, path));
   }
   if (e->name[0]) (void)unlink(export_path(app, path));
   app->export = NULL;
