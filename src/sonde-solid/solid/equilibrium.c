@@ -5,7 +5,6 @@
 #include "elements/hexahedron.h"
 #include "haptics/motion.h"
 
-#include <float.h>
 #include <string.h>
 
 enum { FINEST = 64 };
@@ -13,8 +12,6 @@ static const double least_contact_n_m3 = 1e6, most_contact_n_m3 = 1e13;
 static const double skin_below_m = 0.06;  // skin of the zone is at most this far below the tip
 static const double widest_ball_m = 0.03; // half width of a ball that touches
 static const double turn_radius_m = 0.03; // way of the probe per turn
-static const double least_load_n = 1e-4;  // that residuals are compared with
-static const double rounding = 32 * DBL_EPSILON; // of an element's forces, over modulus times area
 
 sonde_equilibrium_def sonde_equilibrium_def_default(void) {
   sonde_equilibrium_def def = {.version = SONDE_DEF_VERSION,
@@ -82,17 +79,8 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
       if (part == 2) e->zone_node[e->zone_count++] = n;
       e->patch_count += part == 1, e->unknown[n] = e->unknown_count++;
     }
-  double lost = 0; // forces that rounding loses, squared
-  for (uint32_t h = 0; h < mesh->count; ++h) {
-    sonde_vec3 corner[8], g[8];
-    for (int c = 0; c < 8; ++c) {
-      e->corner[h][c] = e->unknown[mesh->corner[h][c]];
-      corner[c] = mesh->node[mesh->corner[h][c]];
-    }
-    const double edge = cbrt(8 * fabs(sonde_hexahedron_gradients(corner, 0, 0, 0, g)));
-    lost += pow(rounding * def->layer[mesh->layer[h]].bulk_pa * edge * edge, 2);
-  }
-  e->least_load_n = fmax(least_load_n, sqrt(lost) / def->tolerance);
+  for (uint32_t h = 0; h < mesh->count; ++h)
+    for (int c = 0; c < 8; ++c) e->corner[h][c] = e->unknown[mesh->corner[h][c]];
   uint32_t others = mesh->face_count;
   for (uint32_t f = 0; f < mesh->face_count; ++f) {
     bool inside = true;

@@ -3,13 +3,17 @@
 #include "equilibrium.h"
 
 #include "base/base.h"
+#include "elements/hexahedron.h"
 #include "sparse/dense.h"
 
+#include <float.h>
 #include <string.h>
 
 enum { STEPS_MOST = 60, INNER_MOST = 60, HALVINGS = 12, SHIFTS_MOST = 8 };
 static const double first_shift = 1e-3, more_shift = 5, armijo = 1e-4;
 static const double rounding = 1e-9, inner_rounding = 1e-13; // of energies, over themselves
+static const double force_rounding = 32 * DBL_EPSILON; // of an element's, over modulus times area
+static const double least_load_n = 1e-4;               // that residuals are compared with
 
 static double norm(const double *x, size_t count) {
   double sum = 0;
@@ -278,6 +282,14 @@ bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
   SONDE_ASSERT(e != NULL && result != NULL);
   const size_t side = 3 * (size_t)e->zone_count, first = 3 * (size_t)sonde_zone_first(e);
   standing s;
+  double lost = 0; // forces that rounding loses, squared
+  for (uint32_t h = 0; h < e->mesh->count; ++h) {
+    sonde_vec3 rest[8], now[8], g[8];
+    const double bulk_pa = corners_of(e, e->moved, h, rest, now)->bulk_pa;
+    const double edge = cbrt(8 * fabs(sonde_hexahedron_gradients(rest, 0, 0, 0, g)));
+    lost += pow(force_rounding * bulk_pa * edge * edge, 2);
+  }
+  e->least_load_n = fmax(least_load_n, sqrt(lost) / e->def.tolerance);
   if (!stand(e, pose, e->moved, &s)) return false;
   for (uint32_t n = 0; n < STEPS_MOST; ++n) {
     bool imposing = false;
