@@ -79,7 +79,7 @@ check(other.next(lesson).kind === "watch" && p.next(lesson).kind === "passed", "
 const { PictureGuide, wrap } = await load("guide.ts");
 check(wrap("closed: the walls touch", 12).join("|") === "closed: the|walls touch", "words are not broken");
 const guide = new PictureGuide();
-guide.layout(50, 50, 8);
+guide.layout(50, 50, 8, { radius_mm: 0, top_mm: 0 });
 const mark = (name, x_mm, depth_mm, more = {}) => ({ kind: "vein", name, why: "", wanted: false, x_mm, depth_mm, half_mm: 4, flat_mm: 4, ...more });
 const marks = [
   mark("Common femoral vein", 5, 20, { wanted: true, why: "closed: the walls touch, there is no clot here" }),
