@@ -60,6 +60,7 @@ test_packages() {
   fi
   has chromium || has google-chrome || missing+=(chromium)
   need_command mandoc mandoc
+  need_command abidiff abigail-tools # compares public interfaces
   need_command teem-unu teem-apps
   need_command mpirun openmpi-bin # starts ranks of a cohort
   need_command dciodvfy dicom3tools # validates DICOM files
