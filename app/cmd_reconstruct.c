@@ -95,16 +95,20 @@ static void print_frames(const sonde_sequence *s, const sonde_located *l) {
          s->count, s->width, s->height, l->used, l->invalid, l->missing, l->world);
 }
 
-static sonde_status leave_one_out(const options *a, const sonde_sequence *s,
-                                  const sonde_located *located, sonde_error *error) {
+static sonde_status leave_one_out(const options *a, sonde_sequence *s, const sonde_located *located,
+                                  sonde_error *error) {
   sonde_left_out r;
+  sonde_pose_findings found;
   sonde_progress progress = app_progress();
   double start = app_seconds(CLOCK_MONOTONIC);
-  sonde_status status = sonde_sequence_leave_one_out(s, &a->slicer, &r, &progress, error);
+  sonde_status status =
+      sonde_sequence_leave_one_out(s, &a->slicer, a->frames.refine_poses, &r, &progress, error);
+  if (!status) status = frames_refine(&a->frames, SONDE_WHOLE_FILE, s, &found, error);
   app_progress_end();
   if (status) return status;
   if (!a->json) {
     print_frames(s, located);
+    frames_show(&found, false);
     printf("left out      %8u frames one by one, %llu pixels, %.2f s\n", r.frames,
            (unsigned long long)r.krige.count, app_seconds(CLOCK_MONOTONIC) - start);
     printf("  %-22s %8s %8s %8s %8s %8s\n", "made from", "RMS", "MAE", "PSNR dB", "NCC", "SSIM");
@@ -125,23 +129,27 @@ static sonde_status leave_one_out(const options *a, const sonde_sequence *s,
   json_likeness("neighbour_mean_", &r.neighbours);
   app_json("joined_along_sweep:%u left_out_beside:%u", r.along_sweep, a->slicer.left_out_beside);
   json_frames(s, located);
+  frames_show(&found, true);
   app_json_end();
   return SONDE_OK;
 }
 
-static sonde_status volume(const options *a, const sonde_sequence *s, const sonde_located *located,
+static sonde_status volume(const options *a, sonde_sequence *s, const sonde_located *located,
                            sonde_error *error) {
+  sonde_pose_findings found;
   sonde_volume v = {0};
   sonde_reconstruct_report r = {0};
   sonde_progress progress = app_progress();
   double start = app_seconds(CLOCK_MONOTONIC);
-  sonde_status status = sonde_reconstruct(s, &a->volume, &v, &r, &progress, error);
+  sonde_status status = frames_refine(&a->frames, SONDE_WHOLE_FILE, s, &found, error);
+  if (!status) status = sonde_reconstruct(s, &a->volume, &v, &r, &progress, error);
   app_progress_end();
   double seconds = app_seconds(CLOCK_MONOTONIC) - start;
   if (!status) status = sonde_volume_save(a->output, &v, !a->raw, error);
   if (!status && a->json) {
     app_json_begin();
     json_frames(s, located);
+    frames_show(&found, true);
     app_json(
         "width:%u height:%u depth:%u spacing_mm:%g voxels:%lu touched:%lu bridged:%lu seconds:%g "
         "volume:%s",
@@ -150,6 +158,7 @@ static sonde_status volume(const options *a, const sonde_sequence *s, const sond
     app_json_end();
   } else if (!status) {
     print_frames(s, located);
+    frames_show(&found, false);
     printf("volume        %u x %u x %u voxels of %g mm: %.1f %% touched, %.1f %% bridged, %.2f s\n",
            v.size[0], v.size[1], v.size[2], a->volume.spacing_m * 1e3,
            100.0 * (double)r.touched / (double)r.voxels,

@@ -41,6 +41,7 @@ static void prepare(void *to) {
 typedef struct work {
   sonde_sequence sequence;
   sonde_located located;
+  sonde_pose_findings found;
   sonde_volume volume;
   sonde_slicer *slicer;
   sonde_image image;
@@ -197,6 +198,8 @@ static sonde_status write_picture(const options *a, work *w, sonde_error *error)
 static sonde_status slice_sequence(const options *a, work *w, sonde_error *error) {
   sonde_sequence *s = &w->sequence;
   sonde_status status = frames_load(a->input, &a->frames, s, &w->located, error);
+  const uint32_t left_out = a->hold_out >= 0 ? (uint32_t)a->hold_out : SONDE_WHOLE_FILE;
+  if (!status) status = frames_refine(&a->frames, left_out, s, &w->found, error);
   if (!status)
     status =
         isnan(a->frame) ? pose_image(a, w, error) : make_image(w, s->clip[2], s->clip[3], error);
@@ -259,6 +262,7 @@ static int run(void *from) {
              w.image.height, w.image.width_m * 1e3, w.image.height_m * 1e3, share, w.seconds * 1e3);
     if (!a->volume) {
       app_json("frames_used:%u world:%s", w.located.used, w.located.world);
+      frames_show(&w.found, true);
     }
     if (w.compared) {
       app_json("rms_grey:%g mae_grey:%g psnr_db:%g ncc:%g ssim:%g", w.likeness.rms_grey,
@@ -277,6 +281,7 @@ static int run(void *from) {
     printf("picture       %u x %u pixels, %.1f x %.1f mm, %.1f %% reached, %.2f ms\n",
            w.image.width, w.image.height, w.image.width_m * 1e3, w.image.height_m * 1e3,
            100 * share, w.seconds * 1e3);
+    frames_show(&w.found, false);
     if (w.compared)
       printf("against real  RMS %.2f, MAE %.2f grey levels, PSNR %.2f dB, NCC %.4f, SSIM %.4f\n",
              w.likeness.rms_grey, w.likeness.mae_grey, w.likeness.psnr_db, w.likeness.ncc,

@@ -3,10 +3,12 @@
 #define SONDE_APP_FRAMES_COMMON_H
 
 #include "options.h"
+#include "sonde/sweep_poses.h"
 
 // What tells where the frames are.
 typedef struct frames_options {
   const char *config, *world, *range, *clip;
+  bool refine_poses;
 } frames_options;
 
 // Their rows in a command's table; m: the member.
@@ -20,9 +22,19 @@ typedef struct frames_options {
       OPT_TEXT(m.range, "frames", "A:B", "use only frames A to B"),                                \
       OPT_TEXT(m.clip, "clip", "X,Y,W,H",                                                          \
                "use only this part of every frame, in pixels; it replaces that of the "            \
-               "configuration")
+               "configuration"),                                                                   \
+      OPT_FLAG(m.refine_poses, "refine-poses",                                                     \
+               "correct the poses by what the frames show: the tracker's jitter, its time offset " \
+               "and the calibration; what the frames do not determine is kept")
 // NOLINTEND(bugprone-macro-parentheses)
 
+// Corrects the poses where the options say so, without the content of frame left_out
+// (SONDE_WHOLE_FILE: none is left out); else leaves the findings zero.
+sonde_status frames_refine(const frames_options *options, uint32_t left_out,
+                           sonde_sequence *sequence, sonde_pose_findings *findings,
+                           sonde_error *error);
+// Prints them, or puts them into the JSON under way; nothing without frames.
+void frames_show(const sonde_pose_findings *findings, bool json);
 // Loads, clips, locates and keeps the range; SONDE_ARGUMENT for options that do not fit.
 sonde_status frames_load(const char *path, const frames_options *options, sonde_sequence *sequence,
                          sonde_located *located, sonde_error *error);

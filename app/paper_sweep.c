@@ -142,7 +142,8 @@ static sonde_status draw_pair(paper *p, const sonde_sequence *sweep, sonde_image
 static sonde_status judge(paper *p, const sonde_sequence *sweep, sonde_error *error) {
   sonde_slicer_options options = sonde_slicer_options_default();
   sonde_left_out r;
-  sonde_status status = sonde_sequence_leave_one_out(sweep, &options, &r, &p->progress, error);
+  sonde_status status =
+      sonde_sequence_leave_one_out(sweep, &options, false, &r, &p->progress, error);
   if (status) return status;
   paper_claim *c = paper_begin(
       p, "slices_interpolate", "2, Figs. 1, 2",

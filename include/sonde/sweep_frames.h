@@ -203,12 +203,14 @@ typedef struct sonde_left_out {
  * Compares over the pixels that all ways reach and that some frame shows brighter than black.
  * Nothing of a left-out frame but its pose enters its picture. `options` gives the bracket's way,
  * gap and reach and how many frames beside are left out too.
+ * @param refine_poses correct the poses first (sweep_poses.h), once for every tenth frame without
+ *        the content of these frames
  * @return SONDE_MISMATCH when fewer than three frames are used
  * @thread owner
  */
 SONDE_API sonde_status sonde_sequence_leave_one_out(const sonde_sequence *sequence,
                                                     const sonde_slicer_options *options,
-                                                    sonde_left_out *result,
+                                                    bool refine_poses, sonde_left_out *result,
                                                     const sonde_progress *progress,
                                                     sonde_error *error);
 

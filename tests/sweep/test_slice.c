@@ -349,7 +349,7 @@ static void bracketing_beats_the_nearest_slice_on_a_real_sweep(void **state) {
   memcpy(c.clip, (uint32_t[4]){190, 14, 438, 580}, sizeof c.clip); // without the black border
   assert_int_equal(sonde_sequence_locate(&s, &c, NULL, NULL, NULL), SONDE_OK);
   for (uint32_t i = 0; i < s.count; ++i) s.frames[i].used = i >= 6 && i < 14;
-  assert_int_equal(sonde_sequence_leave_one_out(&s, NULL, &r, NULL, NULL), SONDE_OK);
+  assert_int_equal(sonde_sequence_leave_one_out(&s, NULL, false, &r, NULL, NULL), SONDE_OK);
   print_message("%u frames: RMS %.2f NCC %.4f, nearest RMS %.2f NCC %.4f, neighbours' mean RMS "
                 "%.2f NCC %.4f\n",
                 r.frames, r.bracket.rms_grey, r.bracket.ncc, r.nearest.rms_grey, r.nearest.ncc,

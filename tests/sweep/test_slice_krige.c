@@ -98,7 +98,7 @@ static void own_grain_is_not_repeated(void **state) {
   for (double share = 0; share < 0.5; share += 0.4) {
     sonde_sequence s = sweep(40, share);
     sonde_left_out r;
-    assert_int_equal(sonde_sequence_leave_one_out(&s, NULL, &r, NULL, NULL), SONDE_OK);
+    assert_int_equal(sonde_sequence_leave_one_out(&s, NULL, false, &r, NULL, NULL), SONDE_OK);
     print_message(
         "share %.1f: place %.2f, any pose %.2f, both sides %.2f, nearest %.2f, mean %.2f\n", share,
         r.place.rms_grey, r.krige.rms_grey, r.bracket.rms_grey, r.nearest.rms_grey,
@@ -122,10 +122,10 @@ static void more_may_be_left_out_beside(void **state) {
     bool out = i == 2 || (i > 3 && i < 8); // two used frames on either side; 3 is none
     if (i != 3) assert_int_equal(sonde_slice_is_left_out(&s, &o, i), out);
   }
-  assert_int_equal(sonde_sequence_leave_one_out(&s, &o, &r, NULL, NULL), SONDE_OK);
+  assert_int_equal(sonde_sequence_leave_one_out(&s, &o, false, &r, NULL, NULL), SONDE_OK);
   assert_int_equal(r.frames, FRAMES - 1 - 6);
   o.left_out_beside = 5;
-  assert_int_equal(sonde_sequence_leave_one_out(&s, &o, &r, NULL, NULL), SONDE_MISMATCH);
+  assert_int_equal(sonde_sequence_leave_one_out(&s, &o, false, &r, NULL, NULL), SONDE_MISMATCH);
   sonde_sequence_clear(&s);
 }
 
