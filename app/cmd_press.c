@@ -15,6 +15,7 @@ typedef struct options {
   double force_n, depth_m; // NaN when not asked for, as all below
   double cuff_pa, vein_depth_m, venous_pa, thrombus_pa, wall_pa, sheath;
   const char *moduli;
+  double friction; // of the solid's skin; NaN: none
   bool solid, json;
 } options;
 
@@ -64,6 +65,8 @@ static const app_option TABLE[] = {
     OPT_TEXT(
         moduli, "moduli", "FILE",
         "materials of the solid, as sonde fit --solid writes them; default those of the study"),
+    OPT_REAL(friction, "friction", "MU", 0, 10, 1,
+             "coefficient of Coulomb's friction between the solid's skin and the probe; default 0"),
     OPT_OUTPUT(image, "image", "PNG",
                "write the echographic image of the settled state, 512 x 512 pixels"),
     OPT_JSON(json)};
@@ -105,6 +108,7 @@ static int run_solid(const options *o) {
   press_solid p = {.model = o->model,
                    .probe = o->probe,
                    .moduli = o->moduli,
+                   .friction = isnan(o->friction) ? 0 : o->friction,
                    .site = o->site,
                    .depth_m = o->depth_m,
                    .force_n = o->force_n};
@@ -115,7 +119,7 @@ static int run_solid(const options *o) {
   app_progress_end();
   if (status) return app_fail("press", &error);
   const sonde_equilibrium_result *r = &p.result;
-  const double work_mj = 1e3 * (r->tissue_j + r->contact_j);
+  const double work_mj = 1e3 * (r->tissue_j + r->contact_j + r->slipped_j);
   if (!o->json) {
     printf("site %ld, probe %s, solid\n", o->site, o->probe);
     printf("force         %8.3f N\n", p.force_n);
@@ -131,7 +135,7 @@ static int run_solid(const options *o) {
   print_vessel("vein", &none, false);
   print_vessel("artery", &none, false);
   app_json("vein_short_mm:%g residual:%g steps:%u", (double)NAN, r->residual, r->steps);
-  app_json("tissue:%s probe:%s site:%ld", "solid", o->probe, o->site);
+  app_json("tissue:%s friction:%g probe:%s site:%ld", "solid", p.friction, o->probe, o->site);
   app_json_end();
   return APP_OK;
 }
@@ -142,6 +146,8 @@ static int check(void *from) {
                                         "venous-mmhg", "thrombus-kpa", "wall-kpa", "sheath",
                                         "preset",      "image"};
   if (!o->solid && o->moduli) return app_usage_error("press", "--moduli goes with --solid");
+  if (!o->solid && app_option_given("friction"))
+    return app_usage_error("press", "--friction goes with --solid");
   for (size_t k = 0; k < sizeof SPRINGS / sizeof *SPRINGS && o->solid; ++k)
     if (app_option_given(SPRINGS[k]))
       return app_usage_error("press", "--solid goes without --%s: it has layers only", SPRINGS[k]);

@@ -91,9 +91,12 @@ static const app_option TABLE[] = {
     OPT_REAL(def.rounding_m, "rounding-mm", "R", 0, 50, 1e-3,
              "round the probe by R: its tip stays where it is, its sides grow by R"),
     OPT_WORD(contact, "contact", "KIND", CONTACTS,
-             "slip: the skin slides on the probe without friction; bonded: the skin under the "
-             "footprint moves with it"),
-    OPT_CALL(read_depths, "depths", "LIST", "depths in mm with commas between, in their order"),
+             "slip: the skin slides on the probe; bonded: the skin under the footprint moves with "
+             "it"),
+    OPT_REAL(def.friction, "friction", "MU", 0, 10, 1,
+             "coefficient of Coulomb's friction of skin that slides; default 0"),
+    OPT_CALL(read_depths, "depths", "LIST",
+             "depths in mm with commas between, in their order: with friction it counts"),
     OPT_REAL(tilt_rad, "tilt-deg", "T", -60, 60, RAD_PER_DEGREE, "turn the probe about its y axis"),
     OPT_REAL(roll_rad, "roll-deg", "T", -60, 60, RAD_PER_DEGREE, "turn the probe about its x axis"),
     OPT_NUMBERS(offset_mm, "offset-mm", "U:V", -100, 100, "shift the probe along the site's axes"),
@@ -138,6 +141,8 @@ static int check(void *from) {
     if (app_option_given(TOLD[k]))
       return app_usage_error(VERB, "--moduli goes without --%s", TOLD[k]);
   o->def.bonded = o->contact == 1;
+  if (o->def.bonded && o->def.friction > 0)
+    return app_usage_error(VERB, "--friction goes with --contact slip");
   for (int k = 0; k < SONDE_SOLID_LAYERS; ++k)
     o->def.layer[k] = (sonde_hyperelastic){o->energy, 1e3 * o->layer[k][0], o->layer[k][1],
                                            1e3 * o->bulk_ratio * o->layer[k][0]};
@@ -149,7 +154,7 @@ static int check(void *from) {
 
 typedef struct solved {
   sonde_equilibrium_result result;
-  double along_n, seconds; // force along the way; of work
+  double along_n, lost_j, seconds; // force along the way; to friction so far; of work
   sonde_vec3 moved_m[POINTS_MOST];
 } solved;
 
@@ -211,6 +216,7 @@ static sonde_status solve_depths(work *w, const options *o, sonde_error *error) 
                                     &s->result, error);
     s->seconds = app_seconds(CLOCK_MONOTONIC) - before;
     s->along_n = -vec_dot(s->result.force_n, w->way);
+    s->lost_j = s->result.slipped_j + (k > 0 ? w->row[k - 1].lost_j : 0);
     for (uint32_t p = 0; p < o->point_count && !status; ++p)
       if (!sonde_equilibrium_at(w->equilibrium, o->point_m[p], &s->moved_m[p]))
         status = app_error(error, SONDE_ARGUMENT, "point %g,%g,%g mm is not in the solid",
@@ -230,7 +236,7 @@ static sonde_status write_csv(const work *w, const options *o, sonde_error *erro
     const solved *s = &w->row[k];
     const sonde_equilibrium_result *r = &s->result;
     sonde_file_printf(file, "%.6g,%.7g,%.7g,%.5g,,,,,,\n", 1e3 * o->depth_m[k], s->along_n,
-                      1e3 * (r->tissue_j + r->contact_j), 1e6 * r->area_m2);
+                      1e3 * (r->tissue_j + r->contact_j + s->lost_j), 1e6 * r->area_m2);
     for (uint32_t p = 0; p < o->point_count; ++p)
       sonde_file_printf(file, "%.6g,,,,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n", 1e3 * o->depth_m[k],
                         1e3 * o->point_m[p].x, 1e3 * o->point_m[p].y, 1e3 * o->point_m[p].z,
@@ -242,15 +248,16 @@ static sonde_status write_csv(const work *w, const options *o, sonde_error *erro
 // What was solved: a table, or one object.
 static void print(const work *w, const options *o) {
   if (!o->json) {
-    printf("probe %s, %s, %s, %u unknowns, %u of skin that may touch\n", w->probe.name,
-           CONTACTS[o->contact], ENERGIES[o->energy], w->unknowns, w->zone_unknowns);
+    printf("probe %s, %s, friction %g, %s, %u unknowns, %u of skin that may touch\n", w->probe.name,
+           CONTACTS[o->contact], o->def.friction, ENERGIES[o->energy], w->unknowns,
+           w->zone_unknowns);
     printf("depth mm    force N    work mJ   area mm2   residual  steps  time s\n");
     for (uint32_t k = 0; k < w->done; ++k) {
       const solved *s = &w->row[k];
       const sonde_equilibrium_result *r = &s->result;
       printf("%8.2f %10.4f %10.4f %10.1f    %.1e  %5u  %6.1f\n", 1e3 * o->depth_m[k], s->along_n,
-             1e3 * (r->tissue_j + r->contact_j), 1e6 * r->area_m2, r->residual, r->steps,
-             s->seconds);
+             1e3 * (r->tissue_j + r->contact_j + s->lost_j), 1e6 * r->area_m2, r->residual,
+             r->steps, s->seconds);
       for (uint32_t p = 0; p < o->point_count; ++p)
         printf("         point %.2f,%.2f,%.2f moves by %.3f,%.3f,%.3f mm\n", 1e3 * o->point_m[p].x,
                1e3 * o->point_m[p].y, 1e3 * o->point_m[p].z, 1e3 * s->moved_m[p].x,
@@ -259,15 +266,17 @@ static void print(const work *w, const options *o) {
     return;
   }
   app_json_begin();
-  app_json("probe:%s contact:%s energy:%s unknowns:%u contact_unknowns:%u", w->probe.name,
-           CONTACTS[o->contact], ENERGIES[o->energy], w->unknowns, w->zone_unknowns);
+  app_json("probe:%s contact:%s friction:%g energy:%s unknowns:%u contact_unknowns:%u",
+           w->probe.name, CONTACTS[o->contact], o->def.friction, ENERGIES[o->energy], w->unknowns,
+           w->zone_unknowns);
   app_json_array("depths");
   for (uint32_t k = 0; k < w->done; ++k) {
     const solved *s = &w->row[k];
     const sonde_equilibrium_result *r = &s->result;
     app_json_object(NULL);
-    app_json("depth_mm:%g force_n:%g work_mj:%g contact_mj:%g area_mm2:%g", 1e3 * o->depth_m[k],
-             s->along_n, 1e3 * (r->tissue_j + r->contact_j), 1e3 * r->contact_j, 1e6 * r->area_m2);
+    app_json("depth_mm:%g force_n:%g work_mj:%g contact_mj:%g lost_mj:%g area_mm2:%g",
+             1e3 * o->depth_m[k], s->along_n, 1e3 * (r->tissue_j + r->contact_j + s->lost_j),
+             1e3 * r->contact_j, 1e3 * s->lost_j, 1e6 * r->area_m2);
     app_json("fx_n:%g fy_n:%g fz_n:%g tx_nmm:%g ty_nmm:%g tz_nmm:%g", r->force_n.x, r->force_n.y,
              r->force_n.z, 1e3 * r->torque_nm.x, 1e3 * r->torque_nm.y, 1e3 * r->torque_nm.z);
     app_json("deepest_mm:%g residual:%g steps:%u inner_steps:%u shifts:%u seconds:%g",
@@ -313,8 +322,8 @@ const app_command cmd_solve = {
     .summary = "press a probe on a hyperelastic solid until it converges",
     .usage = "[MODEL] --site K --depths LIST [options]\n--block D:S:F --depths LIST [options]",
     .text = "Makes a mesh of hexahedra of skin, fat and muscle on the bone, presses a probe on it "
-            "and solves to equilibrium: force and work per depth, whatever the path. The solid's "
-            "moduli are those of the options; the model's springs play no part.",
+            "and solves to equilibrium: force and work per depth, without friction whatever the "
+            "path. The solid's moduli are those of the options; the model's springs play no part.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .prepare = prepare,

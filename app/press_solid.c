@@ -6,6 +6,7 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdlib.h>
 
 enum { STEPS_MOST = 30 };
 static const double DEEPEST_M = 0.06, LONGEST_M = 4e-3, LEAST_N_M = 50, TOLERANCE = 1e-4;
@@ -14,6 +15,8 @@ static sonde_status press_to(press_solid *p, sonde_equilibrium *e, sonde_pose st
                              sonde_error *error) {
   const sonde_vec3 way = pose_axis(start, 2);
   assert(e != NULL && isfinite(depth_m));
+  // With friction the force depends on the way: every depth is pressed from the skin at rest.
+  if (p->friction > 0) sonde_equilibrium_restore(e, start, p->rest);
   const sonde_status status =
       sonde_equilibrium_find(e, pose_shift(start, depth_m, way), &p->result, error);
   p->reaction_n = sqrt(vec_dot(p->result.force_n, p->result.force_n));
@@ -58,12 +61,17 @@ sonde_status press_solid_find(press_solid *p, sonde_error *error) {
   how.half_u_m = probe.half_x_m, how.half_v_m = probe.half_y_m;
   if (!status) status = sonde_hexes_ring(model, site, &how, &mesh, error);
   const sonde_pose start = site ? sonde_site_pose(site, 0) : (sonde_pose){0};
+  def.friction = p->friction;
+  if (!status && !(p->rest = calloc(mesh.node_count, sizeof *p->rest)))
+    status = app_error(error, SONDE_MEMORY, "no memory for %u nodes", mesh.node_count);
   if (!status) status = sonde_equilibrium_create(&mesh, &probe, start, &def, &e, error);
   if (!status && isnan(p->depth_m))
     status = seek_force(p, e, start, error);
   else if (!status)
     status = press_to(p, e, start, p->depth_m, error);
   if (!status) p->force_n = -vec_dot(p->result.force_n, pose_axis(start, 2));
+  free(p->rest);
+  p->rest = NULL;
   sonde_equilibrium_destroy(e);
   sonde_hexes_clear(&mesh);
   sonde_probe_clear(&probe);

@@ -117,12 +117,14 @@ typedef struct sonde_equilibrium_def {
   uint32_t version; /**< SONDE_DEF_VERSION, from sonde_equilibrium_def_default() */
   sonde_hyperelastic layer[SONDE_SOLID_LAYERS];
   bool bonded; /**< the skin under the footprint follows the probe rigidly from where it is at rest;
-                    else it slides on the probe without friction and leaves it freely */
+                    else it slides on the probe and leaves it freely */
+  double friction;     /**< coefficient of Coulomb's friction of skin that slides, 0 to 10; 0 */
   double rounding_m;   /**< radius of a rounding around the probe's body, whose tip stays where it
                             is and whose sides grow by it; 0 */
   double contact_n_m3; /**< pressure of the contact per depth of the skin in the probe; 1e9 */
   double zone_m;       /**< skin that may touch: this far around the footprint; 15 mm */
-  double step_m;       /**< the probe's way is solved in steps of at most this; 3 mm */
+  double step_m;       /**< the probe's way is solved in steps of at most this; 3 mm. With friction
+                            the force depends on the way, and on its steps a little */
   double tolerance;    /**< largest residual over the contact's force; 1e-8 */
 } sonde_equilibrium_def;
 SONDE_API sonde_equilibrium_def sonde_equilibrium_def_default(void); /**< @thread any */
@@ -132,7 +134,9 @@ typedef struct sonde_equilibrium_result {
   sonde_vec3 force_n;   /**< on the probe */
   sonde_vec3 torque_nm; /**< on the probe, about its origin */
   double tissue_j;      /**< strain energy */
-  double contact_j;     /**< of the contact; both together are the work that pressing took */
+  double contact_j;     /**< of the contact; without friction both together are the work that
+                             pressing took */
+  double slipped_j;     /**< what slip has taken on the way from the last pose to this one */
   double area_m2;       /**< skin in contact, at rest */
   double deepest_m;     /**< of the skin in the probe */
   double residual;      /**< over the contact's force, or what rounding allows of it */
@@ -166,7 +170,7 @@ SONDE_API sonde_status sonde_equilibrium_find(sonde_equilibrium *equilibrium, so
 SONDE_API bool sonde_equilibrium_at(const sonde_equilibrium *equilibrium, sonde_vec3 rest_m,
                                     sonde_vec3 *displacement_m);
 /** Goes back to a state: displacements of all nodes and the pose that they belong to. The next
- * sonde_equilibrium_find() of that pose starts from there. @thread owner */
+ * sonde_equilibrium_find() of that pose starts from there, with no friction yet. @thread owner */
 SONDE_API void sonde_equilibrium_restore(sonde_equilibrium *equilibrium, sonde_pose pose,
                                          const sonde_vec3 *displacement_m);
 /** [mesh node_count] displacements of the state; its own. @thread owner */
@@ -180,6 +184,7 @@ typedef struct sonde_force_change {
 } sonde_force_change;
 /**
  * At the state that sonde_equilibrium_find() has left: one solve with the factor of its last step.
+ * With friction, what changes as long as its limits stay.
  * docs/solid_theory.md.
  * @param way unit, how the probe moves without turning; the force is minus its component along it
  * @return CONVERGENCE where the equilibrium has no positive stiffness @thread owner

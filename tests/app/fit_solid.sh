@@ -14,6 +14,13 @@ rejects 'goes without --fat' solve "$MODEL" --site 27 --depths 1 --moduli "$work
 gives 'tissue=solid site=27 penetration_mm=1 work_mj:number' press "$MODEL" --solid --site 27 --depth-mm 1 --moduli "$work/moduli.csv" --json
 force=$(sed -n 's/.*"force_n": \([0-9.]*\),.*/\1/p' "$out")
 gives 'penetration_mm>=0.999 penetration_mm<=1.001' press "$MODEL" --solid --site 27 --force-n "$force" --moduli "$work/moduli.csv" --json
+gives 'contact=slip friction>=0.5 friction<=0.5' solve "$MODEL" --site 27 --depths 1 --friction 0.5 --edge-mm 25 --growth 3 \
+  --moduli "$work/moduli.csv" --json
+gives 'tissue=solid friction>=0.5 force_n>=0.0999 force_n<=0.1001' press "$MODEL" --solid --site 27 --force-n 0.1 --friction 0.5 \
+  --moduli "$work/moduli.csv" --json
+rejects '\--friction goes with --contact slip' solve "$MODEL" --site 27 --depths 1 --contact bonded --friction 0.5
+for mu in -0.1 nan 11; do rejects '\--friction' solve "$MODEL" --site 27 --depths 1 --friction $mu; done
+rejects '\--friction goes with --solid' press "$MODEL" --site 27 --depth-mm 1 --friction 0.5
 rejects '\--solid goes without --case' press "$MODEL" --solid --site 27 --depth-mm 1 --case healthy
 rejects '\--solid needs --site' press "$MODEL" --solid --depth-mm 1
 rejects '\--moduli goes with --solid' press "$MODEL" --site 27 --depth-mm 1 --moduli "$work/moduli.csv"

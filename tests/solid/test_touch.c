@@ -96,9 +96,9 @@ static double *coordinate(sonde_vec3 *p, int k) {
 
 static void forces_and_stiffness_match_differences(void **state) {
   (void)state;
-  static const char *const names[3] = {"linear", "rect:2x2", "ball:5"};
-  static const double rounding[3] = {0, 3e-3, 0};
-  for (int kind = 0; kind < 3; ++kind) {
+  static const char *const names[4] = {"linear", "rect:2x2", "ball:5", "ball:5"};
+  static const double rounding[4] = {0, 3e-3, 0, 0};
+  for (int kind = 0; kind < 4; ++kind) {
     shape s;
     make(&s, names[kind], rounding[kind]);
     const sonde_pose pose = {vec3(0.3e-3, -0.2e-3, 0),
@@ -107,17 +107,23 @@ static void forces_and_stiffness_match_differences(void **state) {
         {-1.5e-3, -1e-3, 0}, {1.2e-3, -1.1e-3, 0}, {1e-3, 1.3e-3, 0}, {-1.3e-3, 1e-3, 0}};
     sonde_vec3 now[4];
     for (int c = 0; c < 4; ++c) now[c] = v_add(rest[c], vec3(0, 1e-4 * c, -1.1e-3));
+    sonde_stick sticks[SONDE_TOUCH_POINTS], *stick = kind == 3 ? sticks : NULL;
+    for (int p = 0; p < SONDE_TOUCH_POINTS; ++p) { // some stick, some slip, one is free
+      const sonde_vec3 out = v_unit(vec3(0.1, 0.02 * p, 1), vec3(0, 0, 1));
+      const sonde_vec3 anchor = pose_apply_inverse(pose, v_madd(rest[p % 4], 0.1 * p, rest[2]));
+      sticks[p] = (sonde_stick){.anchor = anchor, .out = out, .limit_pa = 4e5 * p};
+    }
     double f[12], fp[12], fm[12], k[12][12], worst_f = 0, worst_k = 0, most_f = 0, most_k = 0;
     sonde_touch sum = {0};
-    assert_true(sonde_touch_face(&s.touch, pose, 1e9, rest, now, true, &sum, f, k));
+    assert_true(sonde_touch_face(&s.touch, pose, 1e9, stick, rest, now, true, &sum, f, k));
     for (int j = 0; j < 12; ++j) {
       const double h = 1e-9;
       double *x = coordinate(now, j), keep = *x;
       sonde_touch plus = {0}, minus = {0};
       *x = keep + h;
-      assert_true(sonde_touch_face(&s.touch, pose, 1e9, rest, now, true, &plus, fp, NULL));
+      assert_true(sonde_touch_face(&s.touch, pose, 1e9, stick, rest, now, true, &plus, fp, NULL));
       *x = keep - h;
-      assert_true(sonde_touch_face(&s.touch, pose, 1e9, rest, now, true, &minus, fm, NULL));
+      assert_true(sonde_touch_face(&s.touch, pose, 1e9, stick, rest, now, true, &minus, fm, NULL));
       *x = keep;
       worst_f = fmax(worst_f, fabs((plus.energy_j - minus.energy_j) / (2 * h) + f[j]));
       most_f = fmax(most_f, fabs(f[j]));

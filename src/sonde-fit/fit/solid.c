@@ -180,7 +180,8 @@ static sonde_status open_search(search *s, bool fit, sonde_error *error) {
                                  {"relative_sd", s->def->relative_sd, 1e-4, 1},
                                  {"force_sd_n", s->def->force_sd_n, 1e-6, 100},
                                  {"zero_sd_m", s->def->zero_sd_m, 0, 0.05},
-                                 {"tare_sd_n", s->def->tare_sd_n, 0, 100}};
+                                 {"tare_sd_n", s->def->tare_sd_n, 0, 100},
+                                 {"contact.friction", s->def->contact.friction, 0, 0}};
   if (!status) status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
   // What is sought are logarithms.
   for (int k = 0; k < SONDE_SOLID_LAYERS && !status && fit; ++k) {

@@ -45,8 +45,13 @@ static sonde_status check(const sonde_equilibrium_def *def, sonde_error *error) 
       {"contact_n_m3", def->contact_n_m3, least_contact_n_m3, most_contact_n_m3},
       {"zone_m", def->zone_m, 1e-3, 0.2},
       {"step_m", def->step_m, 1e-5, 0.1},
-      {"tolerance", def->tolerance, 1e-12, 1e-2}};
+      {"tolerance", def->tolerance, 1e-12, 1e-2},
+      {"friction", def->friction, 0, 10}};
   if (!status) status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
+  if (!status && def->bonded && def->friction > 0)
+    status = sonde_fail(error, SONDE_ARGUMENT,
+                        "friction %g: expected 0 of a bonded probe, which nothing slides on",
+                        def->friction);
   return status;
 }
 
@@ -135,10 +140,10 @@ done:
 
 void sonde_equilibrium_destroy(sonde_equilibrium *e) {
   if (!e) return;
-  void *parts[] = {e->unknown,   e->zone_node,   e->face,    e->corner, e->moved,
-                   e->trial,     e->kept,        e->force,   e->step,   e->way,
-                   e->way_trial, e->load,        e->touch,   e->right,  e->schur,
-                   e->matrix,    e->touch_trial, e->imposed, e->target, e->front};
+  void *parts[] = {e->unknown, e->zone_node, e->face,  e->corner, e->moved,       e->trial,
+                   e->kept,    e->force,     e->step,  e->way,    e->way_trial,   e->load,
+                   e->touch,   e->right,     e->schur, e->matrix, e->touch_trial, e->imposed,
+                   e->target,  e->front,     e->stick};
   for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
   sonde_surface_index_destroy(e->shape.hull);
   sonde_numeric_clear(&e->numeric);
@@ -198,6 +203,11 @@ sonde_status sonde_equilibrium_place(const sonde_hexes *mesh, const sonde_probe 
   for (uint32_t k = 0; k < e->zone_count; ++k) e->imposed[k] = def->bonded;
   if (!ball && (def->rounding_m > 0 || patch_m > 0))
     status = sonde_surface_index_create(&probe->body.hull, &e->shape.hull, error);
+  if (!status && def->friction > 0) {
+    e->stick = SONDE_NEW(sonde_stick, SONDE_TOUCH_POINTS * (size_t)e->zone_faces);
+    if (!e->stick) status = sonde_fail_memory(error);
+    sonde_friction_look(e, start, e->moved, NULL, SONDE_FRICTION_FORGET);
+  }
   if (!status) return SONDE_OK;
   sonde_equilibrium_destroy(e);
   *equilibrium = NULL;
@@ -218,12 +228,15 @@ sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
   const double way = sonde_equilibrium_way(from, pose);
   if (!isfinite(way)) return sonde_fail(error, SONDE_ARGUMENT, "the probe's pose is not finite");
   const size_t bytes = e->mesh->node_count * sizeof *e->moved;
+  const size_t points = e->stick ? SONDE_TOUCH_POINTS * (size_t)e->zone_faces : 0;
   sonde_vec3 *begin = SONDE_NEW(sonde_vec3, e->mesh->node_count);
-  if (!begin) return sonde_fail_memory(error);
+  sonde_stick *stuck = SONDE_NEW(sonde_stick, points + 1);
+  sonde_status status = begin && stuck ? SONDE_OK : sonde_fail_memory(error);
+  if (status) goto done;
   memcpy(begin, e->moved, bytes);
+  if (points > 0) memcpy(stuck, e->stick, points * sizeof *stuck);
   const double whole = 1 / fmax(1, ceil(way / e->def.step_m - 1e-9));
   *result = (sonde_equilibrium_result){0};
-  sonde_status status = SONDE_OK;
   for (double done = 0, part = whole; done < 1 && !status;) {
     const double to = done + part > 1 - 1e-9 ? 1 : done + part;
     const sonde_pose next = to < 1 ? sonde_pose_blend(from, pose, to) : pose;
@@ -234,6 +247,7 @@ sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
     }
     if (sonde_equilibrium_solve(e, next, result)) {
       done = to, part = fmin(2 * part, whole), e->pose = next;
+      sonde_friction_look(e, next, e->moved, NULL, SONDE_FRICTION_SLIP);
       continue;
     }
     memcpy(e->moved, e->kept, bytes);
@@ -248,7 +262,8 @@ sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
     sonde_vec3 rest[4], now[4];
     double f[12];
     sonde_equilibrium_face(e, e->moved, e->face[k], rest, now);
-    if (sonde_touch_face(&e->shape, pose, e->def.contact_n_m3, rest, now, false, &outside, f, NULL))
+    if (sonde_touch_face(&e->shape, pose, e->def.contact_n_m3, NULL, rest, now, false, &outside, f,
+                         NULL))
       status = sonde_fail(error, SONDE_CONVERGENCE,
                           "skin beyond the zone of %.1f mm around the footprint touches the probe",
                           1e3 * e->def.zone_m);
@@ -263,7 +278,10 @@ sonde_status sonde_equilibrium_find(sonde_equilibrium *e, sonde_pose pose,
     result->torque_nm = v_sub(result->torque_nm, v_cross(arm, hold));
   }
   if (status) sonde_equilibrium_restore(e, from, begin);
+  if (status && points > 0) memcpy(e->stick, stuck, points * sizeof *stuck);
+done:
   sonde_free(begin);
+  sonde_free(stuck);
   return status;
 }
 
@@ -322,6 +340,7 @@ void sonde_equilibrium_restore(sonde_equilibrium *e, sonde_pose pose,
   SONDE_ASSERT(e != NULL && displacement_m != NULL);
   memcpy(e->moved, displacement_m, e->mesh->node_count * sizeof *e->moved);
   e->pose = pose, e->factored = false;
+  sonde_friction_look(e, pose, e->moved, NULL, SONDE_FRICTION_FORGET);
 }
 
 const sonde_vec3 *sonde_equilibrium_state(const sonde_equilibrium *e) {

@@ -22,6 +22,7 @@ struct sonde_equilibrium {
   sonde_vec3 *target;    // [zone_count] displacement
   uint32_t *face;        // [face_count] faces of the zone, then the others
   uint32_t zone_faces;   //
+  sonde_stick *stick;    // [zone_faces * SONDE_TOUCH_POINTS] NULL: without friction
   sonde_symbolic *symbolic;
   sonde_numeric numeric;
   sonde_vec3 *moved, *trial, *kept; // [node_count] displacements: state, of a line search, before
@@ -75,6 +76,18 @@ uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool m
 // Corners of a face of the skin at displacements u.
 void sonde_equilibrium_face(const sonde_equilibrium *e, const sonde_vec3 *u, uint32_t face,
                             sonde_vec3 rest[4], sonde_vec3 now[4]);
+// The same of face n of the zone, whose nodes have gone v (NULL: none) farther.
+void sonde_equilibrium_zone_face(const sonde_equilibrium *e, const sonde_vec3 *u, const double *v,
+                                 uint32_t n, sonde_vec3 rest[4], sonde_vec3 now[4]);
+// Friction at displacements u and ways v of the zone (NULL: none). Its limits follow the pressure;
+// the anchors stay, or a step ends and slip takes them along, or all friction is forgotten.
+typedef enum sonde_friction_look_kind {
+  SONDE_FRICTION_PRESSURE,
+  SONDE_FRICTION_SLIP,
+  SONDE_FRICTION_FORGET
+} sonde_friction_look_kind;
+void sonde_friction_look(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u,
+                         const double *v, sonde_friction_look_kind kind);
 // Solves at a pose from the state; imposed nodes go to their targets. @return false: none found
 bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
                              sonde_equilibrium_result *result);

@@ -112,8 +112,10 @@ sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe 
       {"pass_m", def->pass_m, 1e-5, 0.05},      {"lag_m", def->lag_m, def->refresh_m, 0.1},
       {"ease_n_s", def->ease_n_s, 1e-3, 1e9}};
   if (!status) status = sonde_bounded_check(range, SONDE_COUNT_OF(range), error);
-  if (!status && def->solid.bonded)
-    status = sonde_fail(error, SONDE_ARGUMENT, "bonded: expected a probe that slides");
+  if (!status && (def->solid.bonded || def->solid.friction > 0))
+    status = sonde_fail(error, SONDE_ARGUMENT,
+                        "bonded %d, friction %g: expected a probe that slides without friction",
+                        def->solid.bonded, def->solid.friction);
   if (status) return status;
   sonde_solid_live *l = SONDE_NEW(sonde_solid_live, 1);
   if (!l) return sonde_fail_memory(error);

@@ -9,7 +9,7 @@
 #include <float.h>
 #include <string.h>
 
-enum { STEPS_MOST = 60, INNER_MOST = 60, HALVINGS = 12, SHIFTS_MOST = 8 };
+enum { STEPS_MOST = 60, INNER_MOST = 60, FRICTION_MOST = 150, HALVINGS = 12, SHIFTS_MOST = 8 };
 static const double first_shift = 1e-3, more_shift = 5, armijo = 1e-4;
 static const double rounding = 1e-9, inner_rounding = 1e-13; // of energies, over themselves
 static const double force_rounding = 32 * DBL_EPSILON; // of an element's, over modulus times area
@@ -108,6 +108,17 @@ void sonde_equilibrium_face(const sonde_equilibrium *e, const sonde_vec3 *u, uin
   }
 }
 
+void sonde_equilibrium_zone_face(const sonde_equilibrium *e, const sonde_vec3 *u, const double *v,
+                                 uint32_t n, sonde_vec3 rest[4], sonde_vec3 now[4]) {
+  SONDE_ASSERT(n < e->zone_faces);
+  sonde_equilibrium_face(e, u, e->face[n], rest, now);
+  for (int c = 0; c < 4 && v; ++c) {
+    const uint32_t at = e->unknown[e->mesh->face[e->face[n]][c]] - sonde_zone_first(e);
+    const double *way = v + 3 * (size_t)at;
+    now[c] = v_add(now[c], vec3(way[0], way[1], way[2]));
+  }
+}
+
 sonde_touch sonde_equilibrium_touch(const sonde_equilibrium *e, sonde_pose pose,
                                     const sonde_vec3 *u, const double *v, bool bend, double *f,
                                     double *matrix) {
@@ -120,12 +131,10 @@ sonde_touch sonde_equilibrium_touch(const sonde_equilibrium *e, sonde_pose pose,
     sonde_vec3 rest[4], now[4];
     size_t at[4];
     double force[12], k[12][12];
-    sonde_equilibrium_face(e, u, e->face[n], rest, now);
-    for (int c = 0; c < 4; ++c) {
-      at[c] = 3 * (size_t)(e->unknown[node[c]] - first);
-      if (v) now[c] = v_add(now[c], vec3(v[at[c]], v[at[c] + 1], v[at[c] + 2]));
-    }
-    if (!sonde_touch_face(&e->shape, pose, e->def.contact_n_m3, rest, now, bend, &sum, force,
+    const sonde_stick *stick = e->stick ? e->stick + SONDE_TOUCH_POINTS * n : NULL;
+    sonde_equilibrium_zone_face(e, u, v, n, rest, now);
+    for (int c = 0; c < 4; ++c) at[c] = 3 * (size_t)(e->unknown[node[c]] - first);
+    if (!sonde_touch_face(&e->shape, pose, e->def.contact_n_m3, stick, rest, now, bend, &sum, force,
                           matrix ? k : NULL))
       continue;
     for (size_t i = 0; i < 12; ++i) {
@@ -140,16 +149,18 @@ sonde_touch sonde_equilibrium_touch(const sonde_equilibrium *e, sonde_pose pose,
   return sum;
 }
 
-// right = load - S v + touch; zero where nodes are imposed. Returns v S v / 2 - load v.
-static double residual_of(sonde_equilibrium *e, const double *v, const double *touch) {
+// Energy of the condensed solid and the contact at ways v: v S v / 2 - load v + contact. Forces of
+// the contact go to touch, right = load - S v + touch; zero where nodes are imposed.
+static double energy_of(sonde_equilibrium *e, sonde_pose pose, const double *v, double *touch) {
   const size_t side = 3 * (size_t)e->zone_count;
-  double energy = 0;
+  double energy = sonde_equilibrium_touch(e, pose, e->moved, v, false, touch, NULL).energy_j;
+  double solid = 0;
   for (size_t i = 0; i < side; ++i) {
     const double pull = product(e->schur + i * side, v, side);
-    energy += v[i] * (0.5 * pull - e->load[i]);
+    solid += v[i] * (0.5 * pull - e->load[i]);
     e->right[i] = e->imposed[i / 3] ? 0 : e->load[i] - pull + touch[i];
   }
-  return energy;
+  return solid + energy;
 }
 
 uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool moving) {
@@ -167,7 +178,7 @@ uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool m
     sonde_touch sum = {0};
     double force[12];
     sonde_equilibrium_face(e, e->moved, e->face[n], rest, now);
-    if (!sonde_touch_face(&e->shape, pose, e->def.contact_n_m3, rest, now, false, &sum, force,
+    if (!sonde_touch_face(&e->shape, pose, e->def.contact_n_m3, NULL, rest, now, false, &sum, force,
                           NULL))
       continue;
     for (int c = 0; c < 4; ++c) {
@@ -176,10 +187,18 @@ uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool m
       way[0] = with.x - now[c].x, way[1] = with.y - now[c].y, way[2] = with.z - now[c].z;
     }
   }
-  sonde_touch sum = sonde_equilibrium_touch(e, pose, e->moved, e->way, false, e->touch, NULL);
-  double energy = residual_of(e, e->way, e->touch) + sum.energy_j;
-  for (uint32_t n = 1; n <= INNER_MOST; ++n) {
-    const double size = norm(e->right, side), scale = norm(e->touch, side) + norm(e->load, side);
+  // Friction's limits follow the pressure whenever a tenth of the residual is left; in between they
+  // stay, so that there is an energy that falls.
+  const uint32_t most = e->stick ? FRICTION_MOST : INNER_MOST;
+  double energy = 0, begin = 0;
+  for (uint32_t n = 1; n <= most; ++n) {
+    double size = n > 1 ? norm(e->right, side) : 0, scale = norm(e->load, side);
+    scale += n > 1 ? norm(e->touch, side) : 0;
+    if (n == 1 || (e->stick && size <= fmax(0.1 * begin, 1e-10 * scale))) {
+      sonde_friction_look(e, pose, e->moved, e->way, SONDE_FRICTION_PRESSURE);
+      energy = energy_of(e, pose, e->way, e->touch);
+      begin = size = norm(e->right, side), scale = norm(e->load, side) + norm(e->touch, side);
+    }
     if (size <= 1e-10 * scale && n > 1) return n;
     double *way = e->way_trial, *at = e->matrix, share = 1;
     memcpy(way, e->right, side * sizeof *way);
@@ -206,15 +225,16 @@ uint32_t sonde_equilibrium_contact(sonde_equilibrium *e, sonde_pose pose, bool m
     memcpy(way, e->right, side * sizeof *way);
     for (int half = 0; half < HALVINGS; ++half, share *= 0.5) {
       for (size_t i = 0; i < side; ++i) at[i] = e->way[i] + share * way[i];
-      sum = sonde_equilibrium_touch(e, pose, e->moved, at, false, e->touch_trial, NULL);
-      energy = residual_of(e, at, e->touch_trial) + sum.energy_j;
+      energy = energy_of(e, pose, at, e->touch_trial);
       if (energy <= before - armijo * share * fall + inner_rounding * fabs(before)) break;
     }
     memcpy(e->way, at, side * sizeof *e->way);
     memcpy(e->touch, e->touch_trial, side * sizeof *e->touch);
-    if (fall <= 1e-24) return n + 1;
+    if (fall > 1e-24) continue;
+    if (!e->stick || size == begin) return n + 1;
+    begin = INFINITY;
   }
-  return INNER_MOST;
+  return most;
 }
 
 // ---- the whole ----------------------------------------------------------------------------
@@ -226,13 +246,9 @@ typedef struct standing {
   double tissue_j;
 } standing;
 
-// @return false: turned inside out
-static bool stand(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u, standing *s) {
+// With the tissue's forces at displacements u at hand.
+static void balance(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u, standing *s) {
   const size_t side = 3 * (size_t)e->zone_count, first = 3 * (size_t)sonde_zone_first(e);
-  s->tissue_j = 0;
-  memset(e->force, 0, 3 * (size_t)e->unknown_count * sizeof *e->force);
-  if (!sonde_equilibrium_add_forces(e, NULL, e->mesh->count, u, &s->tissue_j, e->force))
-    return false;
   s->touch = sonde_equilibrium_touch(e, pose, u, NULL, false, e->touch, NULL);
   s->energy_j = s->tissue_j + s->touch.energy_j;
   double rest = product(e->force, e->force, first), load = 0;
@@ -244,6 +260,15 @@ static bool stand(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u, st
       rest += r * r, load += e->touch[i] * e->touch[i];
   }
   s->residual = sqrt(rest), s->load = fmax(sqrt(load), e->least_load_n);
+}
+
+// @return false: turned inside out
+static bool stand(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u, standing *s) {
+  s->tissue_j = 0;
+  memset(e->force, 0, 3 * (size_t)e->unknown_count * sizeof *e->force);
+  if (!sonde_equilibrium_add_forces(e, NULL, e->mesh->count, u, &s->tissue_j, e->force))
+    return false;
+  balance(e, pose, u, s);
   return isfinite(s->energy_j);
 }
 
@@ -297,7 +322,8 @@ bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
       imposing |= e->imposed[k] && v_distance(e->target[k], e->moved[e->zone_node[k]]) > 1e-12;
     result->residual = s.residual / s.load;
     if (!imposing && result->residual <= e->def.tolerance) {
-      result->tissue_j = s.tissue_j, result->contact_j = s.touch.energy_j;
+      result->tissue_j = s.tissue_j, result->slipped_j += s.touch.slipped_j;
+      result->contact_j = s.touch.energy_j - s.touch.slipped_j;
       result->force_n = s.touch.force_n, result->torque_nm = s.touch.torque_nm;
       result->area_m2 = s.touch.area_m2, result->deepest_m = s.touch.deepest_m;
       return true;
@@ -313,14 +339,18 @@ bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
       for (size_t k = 0; k < side; ++k) e->load[k] = e->step[first + k] - e->force[first + k];
       inner = sonde_equilibrium_contact(e, pose, n == 0);
     }
-    if (!inner) return false;
+    if (!inner || (e->stick && inner >= FRICTION_MOST)) return false;
     memcpy(e->step + first, e->way, side * sizeof *e->way);
     sonde_numeric_expand(&e->numeric, e->step);
     memcpy(e->step + first, e->way, side * sizeof *e->way);
     ++result->steps, result->inner_steps += inner, result->shifts += e->shift > 0;
-    // The forces at the state again: the contact's were those of the last trial.
-    (void)sonde_equilibrium_touch(e, pose, e->moved, NULL, false, e->touch, NULL);
+    // The forces at the state again: the contact's were those of the last trial, and friction's
+    // limits are those of the contact's solution.
+    balance(e, pose, e->moved, &s);
     if (!search_line(e, pose, imposing, &s)) return false;
+    if (!e->stick) continue;
+    sonde_friction_look(e, pose, e->moved, NULL, SONDE_FRICTION_PRESSURE);
+    balance(e, pose, e->moved, &s);
   }
   return false;
 }

@@ -81,8 +81,8 @@ double sonde_touch_point(const sonde_vec3 rest[4], int point, double shape[4]) {
 }
 
 bool sonde_touch_face(const sonde_touch_shape *s, sonde_pose pose, double stiffness_n_m3,
-                      const sonde_vec3 rest[4], const sonde_vec3 now[4], bool bend,
-                      sonde_touch *sum, double f[12], double (*k)[12]) {
+                      const sonde_stick *stick, const sonde_vec3 rest[4], const sonde_vec3 now[4],
+                      bool bend, sonde_touch *sum, double f[12], double (*k)[12]) {
   SONDE_ASSERT(sum != NULL && f != NULL && stiffness_n_m3 > 0);
   const sonde_mat3 turn = q_matrix(pose.rotation), back = m_transpose(turn);
   bool touches = false;
@@ -90,21 +90,39 @@ bool sonde_touch_face(const sonde_touch_shape *s, sonde_pose pose, double stiffn
     double shape[4], depth;
     sonde_vec3 x = vec3(0, 0, 0), out;
     sonde_mat3 change;
-    const double area = sonde_touch_point(rest, p, shape);
+    const double area = sonde_touch_point(rest, p, shape), w = stiffness_n_m3 * area;
     for (int c = 0; c < 4; ++c) x = v_madd(x, shape[c], now[c]);
     const sonde_vec3 local = m_mul_v(back, v_sub(x, pose.position));
-    if (!sonde_touch_depth(s, local, 0, &depth, &out, &change)) continue;
+    const bool in = sonde_touch_depth(s, local, 0, &depth, &out, &change);
+    const bool held = stick && stick[p].limit_pa > 0;
+    if (!in && !held) continue;
     if (!touches) {
       touches = true;
       memset(f, 0, 12 * sizeof *f);
       if (k) memset(k, 0, 12 * sizeof *k);
     }
-    const double w = stiffness_n_m3 * area;
-    out = m_mul_v(turn, out);
-    const sonde_vec3 push = v_scale(out, w * depth);
-    sum->energy_j += 0.5 * w * depth * depth;
-    sum->area_m2 += area;
-    sum->deepest_m = fmax(sum->deepest_m, depth);
+    sonde_vec3 push = vec3(0, 0, 0); // in the probe's frame, as is the stiffness
+    sonde_mat3 stiff = m_zero();
+    if (in) {
+      push = v_scale(out, w * depth);
+      stiff = m_rank1(out, w, 0);
+      if (bend) stiff = m_add(stiff, m_scale(change, -w * depth));
+      sum->energy_j += 0.5 * w * depth * depth;
+      sum->area_m2 += area;
+      sum->deepest_m = fmax(sum->deepest_m, depth);
+    }
+    if (held) {
+      const sonde_vec3 pull = sonde_stick_pull(&stick[p], local);
+      const double way = v_norm(pull), most = stick[p].limit_pa / stiffness_n_m3;
+      const double share = way > most ? most / way : 1; // of the pull that sticks
+      const sonde_vec3 along = v_scale(pull, way > most ? 1 / way : 0);
+      push = v_madd(push, -w * share, pull);
+      sum->energy_j += w * (0.5 * share * way * share * way + most * (1 - share) * way);
+      sum->slipped_j += w * most * (1 - share) * way;
+      stiff = m_add(stiff, m_rank1(stick[p].out, -w * share, w * share));
+      stiff = m_add(stiff, m_rank1(along, -w * share, 0));
+    }
+    push = m_mul_v(turn, push);
     sum->force_n = v_sub(sum->force_n, push);
     sum->torque_nm = v_sub(sum->torque_nm, v_cross(v_sub(x, pose.position), push));
     for (int c = 0; c < 4; ++c) {
@@ -112,8 +130,7 @@ bool sonde_touch_face(const sonde_touch_shape *s, sonde_pose pose, double stiffn
       f[3 * c + 2] += shape[c] * push.z;
     }
     if (!k) continue;
-    sonde_mat3 stiff = m_rank1(out, w, 0);
-    if (bend) stiff = m_add(stiff, m_scale(m_mul(turn, m_mul(change, back)), -w * depth));
+    stiff = m_mul(turn, m_mul(stiff, back));
     for (int c = 0; c < 12; ++c)
       for (int d = 0; d < 12; ++d) k[c][d] += shape[c / 3] * shape[d / 3] * stiff.m[c % 3][d % 3];
   }
