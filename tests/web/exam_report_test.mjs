@@ -6,7 +6,7 @@ import { execFileSync } from "node:child_process";
 import { mkdirSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join, resolve } from "node:path";
-import { browserPath, picture } from "./drive.mjs";
+import { PATIENCE_MS, browserPath, picture } from "./drive.mjs";
 import { contrastFaults } from "./inspect.mjs";
 
 const [writer, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -80,6 +80,7 @@ function figuresAgree(name, shown) {
 
 async function testExample(name) {
   const page = await browser.newPage({ viewport: { width: 1100, height: 900 } });
+  page.setDefaultTimeout(PATIENCE_MS);
   const [told, asked] = [[], []];
   page.on("console", (m) => told.push(m.text()));
   page.on("pageerror", (e) => told.push(String(e)));

@@ -2,6 +2,7 @@
 // a scanner. Placed by dragging or by two clicks; every point can be dragged or moved by arrow keys.
 
 import { draw } from "./dom";
+import { shown, t } from "./words/language";
 
 export type Tool = "distance" | "area" | null;
 type Point = [number, number]; // x from the image's left edge, depth below the probe, mm
@@ -30,7 +31,7 @@ function sizeOf(m: Measure): number {
 }
 
 function sentence(m: Measure): string {
-  return m.kind === "distance" ? `${m.number}  ${sizeOf(m).toFixed(1)} mm` : `${m.number}  ${sizeOf(m).toFixed(0)} mm²`;
+  return m.kind === "distance" ? `${m.number}  ${shown(sizeOf(m), 1)} mm` : `${m.number}  ${sizeOf(m).toFixed(0)} mm²`;
 }
 
 export class Calipers {
@@ -190,13 +191,13 @@ export class Calipers {
   }
 
   private handle(m: Measure, index: number, p: Point): SVGElement {
-    const name = ["first point", "second point", "width"][index]!;
+    const name = [t("caliper.first"), t("caliper.second"), t("caliper.width")][index]!;
     const g = draw("g", {
       class: `handle n${m.number % 4}`,
       transform: `translate(${p[0] * this.scale} ${p[1] * this.scale})`,
       tabindex: 0,
       role: "slider",
-      "aria-label": `${m.kind === "area" ? "Area" : "Distance"} ${m.number}, ${name}; arrow keys move it`,
+      "aria-label": t(m.kind === "area" ? "caliper.area" : "caliper.distance", { n: m.number, point: name }),
       "aria-valuenow": sizeOf(m).toFixed(1),
       "aria-valuetext": sentence(m),
       "data-measure": m.number,

@@ -3,6 +3,7 @@
 
 import { find, press, recall, remember } from "./dom";
 import type { Exam } from "./protocol";
+import { t } from "./words/language";
 
 export interface Mark {
   id: string;
@@ -27,9 +28,9 @@ const asked = (exam: Exam): boolean => exam.step.segment !== "";
 const decided = (exam: Exam): boolean => exam.segments.some((s) => s.decision !== "");
 
 const MARKS: Mark[] = [
-  { id: "move", anchor: "stage", text: "Drag the probe along the leg into the ring.", due: away, done: there },
-  { id: "press", anchor: "press", text: "Pull this slider up slowly and watch the vein in the image. As soon as its walls touch, press Let go below. A healthy vein has closed when the white bar reaches the bracket; above the bracket is too hard.", due: (exam) => there(exam) && !spoiled(exam), done: pressed },
-  { id: "decide", anchor: "decide", text: "Did the walls touch? Then the vein is compressible. Did it stay open? Then there is a clot. After this the bar leads you on.", due: asked, done: decided },
+  { id: "move", anchor: "stage", text: t("coach.move"), due: away, done: there },
+  { id: "press", anchor: "press", text: t("coach.press"), due: (exam) => there(exam) && !spoiled(exam), done: pressed },
+  { id: "decide", anchor: "decide", text: t("coach.decide"), due: asked, done: decided },
 ];
 
 /** The sentence that is due: the first that was neither seen nor done, when there is something to do

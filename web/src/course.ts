@@ -4,7 +4,7 @@
 import { announce, button, find, make } from "./dom";
 import { drawn, Progress, type Step } from "./progress";
 import type { Exam, Lesson } from "./protocol";
-import { GUIDANCE } from "./words";
+import { counted, shown, t } from "./words/language";
 
 export interface CourseActions {
   watch(lesson: string): void;
@@ -63,13 +63,13 @@ export class CourseView {
   /** What the dialog's first button does now, in words. */
   get goWords(): string {
     const lesson = this.course[this.chosen];
-    if (!lesson) return "Start";
+    if (!lesson) return t("course.start");
     const step = this.progress.next(lesson);
-    if (this.asking) return "Back to the lesson";
-    if (step.kind === "watch") return "Watch the demonstration";
-    if (step.kind === "practise") return `Practise: ${step.turn + 1} of ${lesson.practice.length}`;
-    if (step.kind === "quiz") return "Answer the questions";
-    return this.chosen + 1 < this.course.length ? "Next lesson" : "Watch again";
+    if (this.asking) return t("course.back");
+    if (step.kind === "watch") return t("course.watch");
+    if (step.kind === "practise") return t("course.practise", { n: step.turn + 1, of: lesson.practice.length });
+    if (step.kind === "quiz") return t("course.answer");
+    return this.chosen + 1 < this.course.length ? t("course.next") : t("course.watch_again");
   }
 
   /** Does that; true when the dialog is done with. */
@@ -92,7 +92,7 @@ export class CourseView {
 
   private list(): HTMLElement {
     const box = make("fieldset", "cards case lessons");
-    box.append(make("legend", "caption", "Lessons"));
+    box.append(make("legend", "caption", t("course.lessons")));
     const current = this.progress.current(this.course);
     this.course.forEach((l, k) => {
       const row = make("label", "card");
@@ -109,8 +109,8 @@ export class CourseView {
       const words = make("span", "words");
       words.append(make("b", "", `${k + 1}. ${l.title}`), this.dots(share, step.kind === "passed"));
       row.append(input, words);
-      if (step.kind === "passed") row.append(make("i", "level passed", `${TICK} passed`));
-      else if (k === current) row.append(make("i", "level next", "next"));
+      if (step.kind === "passed") row.append(make("i", "level passed", t("course.passed", { tick: TICK })));
+      else if (k === current) row.append(make("i", "level next", t("course.comes_next")));
       box.append(row);
     });
     return box;
@@ -121,7 +121,7 @@ export class CourseView {
     const count = share.filter(Boolean).length;
     dots.append(...share.map((on) => make("i", on || passed ? "on" : "")));
     dots.setAttribute("role", "img");
-    dots.setAttribute("aria-label", `${count} of ${share.length} steps done`);
+    dots.setAttribute("aria-label", t("course.steps_done", { n: count, of: share.length }));
     return dots;
   }
 
@@ -132,32 +132,31 @@ export class CourseView {
     box.append(make("h3", "", l.title), make("p", "goal", l.goal));
     if (l.patient) box.append(make("p", "patient", l.patient));
     const list = make("ol", "path");
-    list.append(this.row("Watch", `The expert examines ${l.places === 1 ? "one place" : `${l.places} places`}, step by step.`, done.watched, step.kind === "watch", () => this.take(l, { kind: "watch" })));
+    list.append(this.row(t("course.watch_title"), counted("course.watch_places", l.places), done.watched, step.kind === "watch", () => this.take(l, { kind: "watch" })));
     l.practice.forEach((level, turn) => {
-      const t = done.turns[turn];
+      const did = done.turns[turn];
       const barred = level === "exam" && l.bar;
-      const words = level === "full" ? "All help: where, what, how far, and why." : level === "hints" ? "Vessels by name, more only when you ask." : "Alone, as in an examination.";
-      const score = t ? ` ${t.score.toFixed(0)} points${barred ? (t.reached ? ", the bar is reached" : ", below the bar") : ""}.` : "";
-      const good = t !== null && t !== undefined && (!barred || t.reached);
-      const title = drawn(l) ? `Patient ${turn + 1}` : `Practise ${turn + 1}: ${GUIDANCE[level][0].toLowerCase() === "none" ? "no help" : level === "hints" ? "names" : "all help"}`;
-      list.append(this.row(title, words + score, good, step.kind === "practise" && step.turn === turn, () => this.take(l, { kind: "practise", turn })));
+      const words = level === "full" ? t("course.full") : level === "hints" ? t("course.hints") : t("course.alone");
+      const scored = !did ? words : t(!barred ? "course.points" : did.reached ? "course.points_reached" : "course.points_below", { words, points: did.score.toFixed(0) });
+      const good = did !== null && did !== undefined && (!barred || did.reached);
+      const title = drawn(l) ? t("course.patient", { n: turn + 1 }) : t(`course.practise_${level}`, { n: turn + 1 });
+      list.append(this.row(title, scored, good, step.kind === "practise" && step.turn === turn, () => this.take(l, { kind: "practise", turn })));
     });
     if (l.quiz.length) {
       const right = done.answered.filter(Boolean).length;
-      list.append(this.row("Questions", `${right} of ${l.quiz.length} answered.`, right === l.quiz.length, step.kind === "quiz", () => this.take(l, { kind: "quiz" })));
+      list.append(this.row(t("course.questions"), t("course.answered", { n: right, of: l.quiz.length }), right === l.quiz.length, step.kind === "quiz", () => this.take(l, { kind: "quiz" })));
     }
     box.append(list);
     if (l.bar) {
-      const spread = `${l.bar.mean.toFixed(1)} ± ${l.bar.sd.toFixed(1)}`;
-      box.append(make("p", "bar-words", `The bar: ${l.bar.score} of 100 points and the right diagnosis. The expert came to ${spread} in ${l.bar.runs} examinations, ${l.bar.time_s.toFixed(0)} s each.`));
+      box.append(make("p", "bar-words", t("course.bar", { points: l.bar.score, mean: shown(l.bar.mean, 1), sd: shown(l.bar.sd, 1), runs: l.bar.runs, seconds: l.bar.time_s.toFixed(0) })));
     }
     return box;
   }
 
   private row(title: string, words: string, done: boolean, next: boolean, action: () => boolean): HTMLElement {
     const row = make("li", `${done ? "done" : ""}${next ? " next" : ""}`);
-    const go = button(done ? "Again" : "Go", () => action() && find<HTMLDialogElement>("start").close());
-    go.setAttribute("aria-label", `${title}: ${done ? "again" : "go"}`);
+    const go = button(done ? t("course.again") : t("course.go"), () => action() && find<HTMLDialogElement>("start").close());
+    go.setAttribute("aria-label", done ? t("course.again_label", { title }) : t("course.go_label", { title }));
     const text = make("span", "words");
     text.append(make("b", "", title), make("span", "", words));
     row.append(make("i", "tick", done ? TICK : ""), text, go);
@@ -169,7 +168,7 @@ export class CourseView {
   private quiz(l: Lesson): HTMLElement {
     const box = make("div", "options quiz");
     const done = this.progress.done(l);
-    box.append(make("h3", "", `Questions: ${l.title}`));
+    box.append(make("h3", "", t("course.questions_of", { title: l.title })));
     l.quiz.forEach((q, k) => {
       const field = make("fieldset", "question");
       const why = make("p", "why");
@@ -183,7 +182,7 @@ export class CourseView {
           const right = c === q.right;
           for (const other of field.querySelectorAll(".choice")) other.classList.remove("good", "bad");
           row.classList.add(right ? "good" : "bad");
-          why.textContent = right ? `Right. ${q.why}` : "Not so. Think of the pictures that you have just seen, and choose again.";
+          why.textContent = right ? t("course.right", { why: q.why }) : t("course.not_so");
           if (right) this.progress.answer(l, k);
           announce(why.textContent);
         };
@@ -206,17 +205,17 @@ export class CourseView {
     file.onchange = async () => {
       const text = await file.files?.[0]?.text();
       const good = text !== undefined && this.progress.load(text);
-      announce(good ? "Progress read" : "This file holds no progress");
+      announce(good ? t("course.read") : t("course.no_progress"));
       this.choose("");
       this.actions.changed();
     };
-    const save = button("Save progress", () => {
+    const save = button(t("course.save"), () => {
       const link = make("a");
       link.href = URL.createObjectURL(new Blob([this.progress.text()], { type: "application/json" }));
       link.download = "sonde-progress.json";
       link.click();
       URL.revokeObjectURL(link.href);
     });
-    return [save, button("Load", () => file.click()), file];
+    return [save, button(t("course.load"), () => file.click()), file];
   }
 }

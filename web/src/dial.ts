@@ -1,6 +1,7 @@
 // The angle of the image plane from transverse: a needle over an arc whose middle is what is asked.
 
 import { draw } from "./dom";
+import { t } from "./words/language";
 
 const ALLOWED_DEG = 20;
 const END_DEG = 60;
@@ -21,7 +22,7 @@ export class Dial {
   private readonly value = draw("text", { x: 60, y: 72, "text-anchor": "middle" });
 
   constructor(private readonly box: HTMLElement) {
-    const svg = draw("svg", { viewBox: "0 0 120 78", role: "img", "aria-label": "Angle of the image from transverse" });
+    const svg = draw("svg", { viewBox: "0 0 120 78", role: "img", "aria-label": t("dial.label") });
     svg.append(
       draw("path", { d: arc(-END_DEG, END_DEG), class: "arc" }),
       draw("path", { d: arc(-ALLOWED_DEG, ALLOWED_DEG), class: "arc good" }),
@@ -39,6 +40,6 @@ export class Dial {
     this.needle.setAttribute("x2", String(x));
     this.needle.setAttribute("y2", String(y));
     this.box.classList.toggle("ok", ok);
-    this.value.textContent = `${Math.abs(angle_deg).toFixed(0)}° off transverse`;
+    this.value.textContent = t("dial.off", { deg: Math.abs(angle_deg).toFixed(0) });
   }
 }

@@ -1,5 +1,7 @@
 // Small helpers for the document: finding, making, announcing, and giving the focus back.
 
+import { named, t } from "./words/language";
+
 export function find<T extends HTMLElement>(id: string): T {
   const element = document.getElementById(id);
   if (!element) throw new Error(`#${id} is missing`);
@@ -38,7 +40,7 @@ export function stepper(id: string, name: string, output: HTMLElement, change: (
   const step = (text: string, way: number): HTMLElement => {
     const one = button(text, () => change(way));
     Object.assign(one, { title, id: `${id}-${way < 0 ? "less" : "more"}` });
-    one.setAttribute("aria-label", `${name} ${way < 0 ? "less" : "more"}`);
+    one.setAttribute("aria-label", way < 0 ? t("step.less", { name }) : t("step.more", { name }));
     return one;
   };
   row.append(make("span", "caption", name), step("−", -1), output, step("+", 1));
@@ -74,10 +76,7 @@ export function announce(sentence: string): void {
 }
 
 /** "partial_mural" -> "Partial mural" */
-export function label(name: string): string {
-  const words = name.replace(/.*\//, "").replace(/_/g, " ");
-  return words.charAt(0).toUpperCase() + words.slice(1);
-}
+export const label = named;
 
 /** The value of a rising list so many places beside the one that is nearest to `now`. */
 export function beside(list: number[], now: number, way: number): number {

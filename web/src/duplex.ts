@@ -5,6 +5,7 @@ import { announce, beside, draw, find, make, press, pressed, stepper } from "./d
 import { type Face, FLAT, halfOf, lineOf, placeOf } from "./lines";
 import type { ColourFrame, ColourShown, Controls } from "./protocol";
 import { Wishes } from "./wish";
+import { shown, t } from "./words/language";
 
 const SCALES_CM_S = [1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 40, 60, 100];
 const STEER_DEG = [0, 20, -20];
@@ -65,7 +66,7 @@ export class DopplerBox {
   private face = FLAT;
   private drag: { x: number; y: number; box: Box; corner: boolean } | null = null;
   private readonly outline = draw("path", { class: "box" });
-  private readonly body = draw("path", { class: "grip", tabindex: 0, role: "application", "aria-label": "Colour box: arrow keys move it, with Shift its size" });
+  private readonly body = draw("path", { class: "grip", tabindex: 0, role: "application", "aria-label": t("duplex.box") });
   private readonly corner = draw("rect", { class: "grip corner", width: 18, height: 18 });
   private readonly bar = draw("g", { class: "bar" });
   private barKey = "";
@@ -126,7 +127,7 @@ export class DopplerBox {
     const cells = Array.from({ length: steps }, (_, k) =>
       draw("rect", { x: left, y: top + (k * height) / steps, width, height: height / steps + 0.6, fill: css(PALETTES[colour.shown][Math.round(255 - (k / (steps - 1)) * 254)]!) }),
     );
-    const words = colour.shown === "power" ? ["more", "less", ""] : [`+${colour.limit_cm_s.toFixed(1)}`, `−${colour.limit_cm_s.toFixed(1)}`, "cm/s"];
+    const words = colour.shown === "power" ? [t("duplex.more"), t("duplex.less"), ""] : [`+${shown(colour.limit_cm_s, 1)}`, `−${shown(colour.limit_cm_s, 1)}`, "cm/s"];
     this.bar.replaceChildren(
       ...cells,
       draw("text", { x: left, y: top - 5 }, words[0]),
@@ -196,7 +197,7 @@ export class Duplex {
   private controls: Controls | null = null;
   private sent = 0;
   private readonly values = { scale: make("output"), gain: make("output"), steer: make("output") };
-  private readonly lean = stepper("steer", "Steer", this.values.steer, (way) => this.steer(way), "\\: lean of the beam");
+  private readonly lean = stepper("steer", t("duplex.steer"), this.values.steer, (way) => this.steer(way), t("duplex.steer.title"));
 
   constructor(
     private readonly connection: Connection,
@@ -207,8 +208,8 @@ export class Duplex {
     press("squeeze", () => this.hand("squeeze"));
     press("breathe", () => this.hand("breathe"));
     find("colour-tools").append(
-      stepper("scale", "Scale", this.values.scale, (way) => this.scale(way), "; and ': velocity from which colour folds"),
-      stepper("gain", "Gain", this.values.gain, (way) => this.gain(way), "− and =: how little is shown"),
+      stepper("scale", t("duplex.scale"), this.values.scale, (way) => this.scale(way), t("duplex.scale.title")),
+      stepper("gain", t("duplex.gain"), this.values.gain, (way) => this.gain(way), t("duplex.gain.title")),
       this.lean,
     );
     box.moved = (mm, last) => {
@@ -278,6 +279,6 @@ export class Duplex {
     if (action === "squeeze") this.squeezed();
     pressed(action, true);
     window.setTimeout(() => pressed(action, false), action === "squeeze" ? SQUEEZE_MS : BREATH_MS);
-    announce(action === "squeeze" ? "The calf is squeezed." : "The patient breathes in deeply.");
+    announce(action === "squeeze" ? t("duplex.squeezed") : t("duplex.breathes"));
   }
 }

@@ -9,6 +9,7 @@ import { PictureGuide } from "./guide";
 import { FLAT } from "./lines";
 import type { Controls, Frame, Picture } from "./protocol";
 import { ink } from "./theme";
+import { amid, shown, t } from "./words/language";
 
 const RULER_PX = 40;
 const CURVE_PX = 26; // gain over depth, left of the image
@@ -106,8 +107,8 @@ export class EchoView {
     private readonly text: HTMLElement,
     private readonly values: HTMLElement,
   ) {
-    this.live = new Pane("Echo image", () => this.list());
-    this.kept = new Pane("Kept echo image", () => this.list());
+    this.live = new Pane(t("page.echo_image"), () => this.list());
+    this.kept = new Pane(t("echo.kept_image"), () => this.list());
     this.kept.root.hidden = true;
     this.box.prepend(this.kept.root, this.live.root);
     this.marks = context(overlay);
@@ -176,7 +177,7 @@ export class EchoView {
     this.compared = on;
     if (on) {
       this.kept.copyFrom(this.live);
-      this.kept.title.textContent = `Kept, ${this.force_n.toFixed(1)} N`;
+      this.kept.title.textContent = t("echo.kept_force", { force: shown(this.force_n, 1) });
       this.live.calipers.clear();
     } else {
       this.kept.calipers.clear();
@@ -204,8 +205,8 @@ export class EchoView {
     const live = this.live.calipers.measures;
     const head = (text: string): HTMLElement => make("span", "which", text);
     this.values.replaceChildren(
-      ...(kept.length ? [head("Kept"), ...kept.map(line)] : []),
-      ...(kept.length && live.length ? [head("Now")] : []),
+      ...(kept.length ? [head(t("echo.kept")), ...kept.map(line)] : []),
+      ...(kept.length && live.length ? [head(t("echo.now"))] : []),
       ...live.map(line),
     );
     this.layout();
@@ -213,16 +214,15 @@ export class EchoView {
   }
 
   private titles(): void {
-    const state = this.frozen ? "Frozen" : this.compared ? "Now" : "";
-    const force = this.compared ? `, ${this.force_n.toFixed(1)} N` : "";
+    const state = this.frozen ? t("echo.frozen") : this.compared ? t("echo.now") : "";
+    const force = this.compared ? `, ${shown(this.force_n, 1)} N` : "";
     this.live.title.textContent = state ? state + force : "";
   }
 
   private caption(controls: Controls): void {
-    const what = this.nameCase ? `, ${label(controls.case).toLowerCase()}` : "";
-    this.text.textContent =
-      `${label(controls.probe)} probe${what}\n` +
-      `${controls.frequency_mhz.toFixed(1)} MHz, gain ${controls.gain_db.toFixed(0)} dB, range ${controls.dynamic_range_db.toFixed(0)} dB`;
+    const probe = label(controls.probe);
+    const head = this.nameCase ? t("echo.probe_case", { probe, name: amid(label(controls.case)) }) : t("echo.probe", { probe });
+    this.text.textContent = `${head}\n${t("echo.settings", { mhz: shown(controls.frequency_mhz, 1), gain: controls.gain_db.toFixed(0), range: controls.dynamic_range_db.toFixed(0) })}`;
   }
 
   /** Largest pictures with their true proportions between the gain curve and the ruler. */

@@ -5,6 +5,7 @@ import { announce, button, find, make, press } from "./dom";
 import type { Decision, Exam, Segment } from "./protocol";
 import type { Feedback } from "./feedback";
 import { finding, FINDINGS } from "./words";
+import { amid, t } from "./words/language";
 
 export interface ExamActions {
   decide(segment: string, decision: Decision): void;
@@ -84,11 +85,11 @@ export class ExamBar {
 
   private sayStep(exam: Exam): void {
     const hint = exam.hint !== "";
-    const text = exam.step.text || (exam.guidance === "exam" ? "Examine the vein and say what you find in each segment." : "");
+    const text = exam.step.text || (exam.guidance === "exam" ? t("exam.examine") : "");
     find("step-text").textContent = text;
-    find("step-detail").textContent = hint ? `Hint: ${exam.hint}` : exam.step.detail;
+    find("step-detail").textContent = hint ? t("exam.hint", { hint: exam.hint }) : exam.step.detail;
     find("step-detail").classList.toggle("hinted", hint);
-    announce(hint ? `${text} Hint: ${exam.hint}` : text);
+    announce(hint ? `${text} ${t("exam.hint", { hint: exam.hint })}` : text);
   }
 
   private fill(segments: Segment[]): void {
@@ -103,7 +104,7 @@ export class ExamBar {
     const root = button("", () => this.choose(s.id), "segment");
     const [dots, found] = [make("span", "dots"), make("span", "found")];
     root.setAttribute("role", "radio");
-    root.title = s.needed ? s.title : `${s.title}: not part of this protocol`;
+    root.title = s.needed ? s.title : t("exam.not_in_protocol", { segment: s.title });
     root.append(make("span", "name", s.title), dots, found);
     return { root, dots, finding: found };
   }
@@ -118,15 +119,16 @@ export class ExamBar {
       cell.root.classList.toggle("done", s.points > 0 && s.done >= s.points);
       cell.root.classList.toggle("spare", !s.needed);
       cell.dots.classList.toggle("word", !s.needed || s.points > 5);
-      cell.dots.textContent = s.needed ? (s.points > 5 ? `${s.done} / ${s.points}` : "●".repeat(Math.min(s.done, s.points)) + "○".repeat(Math.max(0, s.points - s.done))) : "not asked";
+      cell.dots.textContent = s.needed ? (s.points > 5 ? `${s.done} / ${s.points}` : "●".repeat(Math.min(s.done, s.points)) + "○".repeat(Math.max(0, s.points - s.done))) : t("exam.not_asked");
       cell.finding.textContent = s.decision ? finding(s.decision) : "";
       cell.root.setAttribute(
         "aria-label",
-        `${s.title}: ${s.needed ? `${s.done} of ${s.points} compressions` : "not asked"}, ${finding(s.decision).toLowerCase()}`,
+        s.needed ? t("exam.segment_state", { segment: s.title, done: s.done, points: s.points, finding: amid(finding(s.decision)) })
+          : t("exam.segment_not_asked", { segment: s.title, finding: amid(finding(s.decision)) }),
       );
     }
     const now = segments.find((s) => s.id === this.chosen);
-    find("decide-title").textContent = now ? `Finding: ${now.title}` : "Finding";
+    find("decide-title").textContent = now ? t("exam.finding_of", { segment: now.title }) : t("page.finding");
     const due = now !== undefined && now.needed && now.done >= now.points && now.decision === "" && this.exam?.guidance !== "exam";
     find("decide").classList.toggle("due", due);
     this.choices.forEach((b, i) => {
@@ -179,7 +181,7 @@ export class ExamBar {
     // At a station of the worksheet the finding is that station's, and the segment's follows.
     const next = this.actions.write(now.id, decision) ?? (now.decision === decision ? "" : decision);
     this.actions.decide(now.id, next);
-    announce(`${now.title}: ${finding(next)}`);
+    announce(t("exam.said", { segment: now.title, finding: finding(next) }));
   }
 
   key(code: string, shift: boolean): boolean {
@@ -198,12 +200,12 @@ export class ExamBar {
     if (!this.exam || !this.controls) return;
     const open = this.exam.segments.filter((s) => s.needed && s.decision === "").map((s) => s.title);
     const box = find<HTMLDialogElement>("finish");
-    const head = make("h2", "", "Finish the exam?");
+    const head = make("h2", "", t("exam.finish_title"));
     head.id = "finish-title";
-    const words = open.length ? `Still without a finding: ${open.join(", ")}.` : "Every segment that the protocol asks for has a finding.";
+    const words = open.length ? t("exam.open", { segments: open.join(", ") }) : t("exam.all_found");
     const row = make("div", "actions");
-    const done = button("Finish and see the result", () => (box.close(), this.actions.finish()), "primary");
-    row.append(button("Go on", () => box.close()), done);
+    const done = button(t("exam.finish"), () => (box.close(), this.actions.finish()), "primary");
+    row.append(button(t("exam.go_on"), () => box.close()), done);
     const gaps = this.actions.gaps();
     box.replaceChildren(head, make("p", open.length ? "warn" : "", words), ...(gaps ? [make("p", "warn", gaps)] : []), row);
     box.showModal();

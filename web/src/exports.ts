@@ -3,6 +3,7 @@
 
 import { announce, button, find, make } from "./dom";
 import type { ExamEntry } from "./protocol";
+import { t } from "./words/language";
 
 export interface ExportFile {
   name: string;
@@ -31,7 +32,7 @@ export interface ExportActions {
 const KINDS = [
   { what: "igs.mha", name: "MetaImage", note: "PLUS, 3D Slicer (.igs.mha)" },
   { what: "seq.nrrd", name: "NRRD", note: "3D Slicer (.seq.nrrd)" },
-  { what: "dcm", name: "DICOM", note: "archives, ultrasound multi-frame (.dcm)" },
+  { what: "dcm", name: "DICOM", note: t("export.dicom") },
 ];
 
 export class ExportDialog {
@@ -63,15 +64,15 @@ export class ExportDialog {
     const same = before && before.running === message.running && before.files.length === message.files.length && before.what === message.what;
     if (same && bar) bar.value = message.progress; // the focus stays where it is
     else this.build();
-    if (before?.running && !message.running) announce(message.message || "The file is there.");
+    if (before?.running && !message.running) announce(message.message || t("export.there"));
   }
 
   private build(): void {
     const exam = this.exam!;
     const message = this.message;
-    const title = make("h2", "", `Files of ${exam.title}`);
+    const title = make("h2", "", t("export.files_of", { title: exam.title }));
     title.id = "export-title";
-    const intro = make("p", "intro", "The recording as a sequence of images with the probe's pose, time, force and area ratios. The program writes it anew, which takes about as long as the exam took.");
+    const intro = make("p", "intro", t("export.intro"));
     const kinds = make("div", "kinds");
     const running = message?.running ?? false;
     for (const kind of exam.recording ? KINDS : []) {
@@ -83,7 +84,7 @@ export class ExportDialog {
       kinds.append(row);
     }
     const row = make("div", "actions");
-    const close = button("Close", () => this.box.close(), "primary");
+    const close = button(t("page.close"), () => this.box.close(), "primary");
     row.append(make("span", "spring"), close);
     this.box.replaceChildren(title, intro, this.parts(), kinds, this.state(), this.files(), row);
     if (this.box.open && !this.box.contains(document.activeElement)) close.focus();
@@ -93,9 +94,9 @@ export class ExportDialog {
   private parts(): HTMLElement {
     const count = this.message?.parts ?? 1;
     if (count < 2) return make("span");
-    const row = make("label", "", "Part, each with the patient in another position: ");
+    const row = make("label", "", `${t("export.part")} `);
     const select = make("select");
-    for (let k = 1; k <= count; ++k) select.append(new Option(`${k} of ${count}`, String(k), false, k === this.part));
+    for (let k = 1; k <= count; ++k) select.append(new Option(t("result.n_of", { n: k, of: count }), String(k), false, k === this.part));
     select.onchange = () => (this.part = Number(select.value));
     row.append(select);
     return row;
@@ -106,9 +107,9 @@ export class ExportDialog {
     const box = make("p", "export-state");
     if (message?.running) {
       const bar = make("progress");
-      bar.setAttribute("aria-label", "Export");
+      bar.setAttribute("aria-label", t("export.progress"));
       bar.value = message.progress;
-      box.append(bar, " ", button("Cancel", () => this.actions.ask(this.exam!.id, "cancel", 1)));
+      box.append(bar, " ", button(t("export.cancel"), () => this.actions.ask(this.exam!.id, "cancel", 1)));
     } else box.textContent = message?.message ?? "";
     return box;
   }

@@ -3,6 +3,7 @@
 
 import { announce, find, press, release } from "./dom";
 import type { Exam, Film } from "./protocol";
+import { counted, t } from "./words/language";
 
 export interface FilmActions {
   play(playing: boolean, speed: number): void;
@@ -39,14 +40,14 @@ export class FilmBar {
       announce(f.words);
     }
     const play = find("film-play");
-    play.textContent = f.playing ? "Pause" : begun ? "Play" : "Begin";
+    play.textContent = f.playing ? t("film.pause") : begun ? t("page.replay_play") : t("page.film_play");
     play.hidden = f.over;
     play.classList.toggle("primary", !f.playing);
     find("film-next").hidden = f.over || !f.playing;
     find<HTMLButtonElement>("film-next").disabled = !f.reading || !controls;
-    find("film-leave").textContent = f.over ? "On with the lesson" : "Leave";
+    find("film-leave").textContent = f.over ? t("film.on") : t("page.leave");
     find("film-leave").classList.toggle("primary", f.over);
-    find("film-place").textContent = f.over ? `all ${f.places} places` : begun ? `place ${f.place + 1} of ${f.places}` : `${f.places} ${f.places === 1 ? "place" : "places"}`;
+    find("film-place").textContent = f.over ? counted("film.all", f.places) : begun ? t("film.place", { n: f.place + 1, places: f.places }) : counted("film.places", f.places);
     if (document.activeElement !== this.speed) this.speed.value = String(f.speed);
     for (const id of ["film-play", "film-leave", "film-speed"]) find<HTMLButtonElement>(id).disabled = !controls;
   }

@@ -5,6 +5,7 @@ import { find, make } from "./dom";
 import { feedback, type Feedback } from "./feedback";
 import type { Compression, Snapshot } from "./protocol";
 import { ink, onTheme } from "./theme";
+import { shown, t } from "./words/language";
 
 const TOP_PX = 10;
 const FOOT_PX = 8;
@@ -49,10 +50,10 @@ export class ForceBar {
     if (!on) return;
     this.force_n = this.rendered_n = 0;
     find("force-value").replaceChildren("–", make("small", "", "N"));
-    find("force-word").textContent = "not connected";
+    find("force-word").textContent = t("force.not_connected");
     find("force-head").dataset.tone = "lost";
     this.canvas.removeAttribute("aria-valuenow");
-    this.canvas.setAttribute("aria-valuetext", "not connected");
+    this.canvas.setAttribute("aria-valuetext", t("force.not_connected"));
     this.paint();
   }
 
@@ -63,12 +64,12 @@ export class ForceBar {
     const touching = s.contact_area_mm2 > 0;
     const said = feedback({ force_n: this.force_n, touching, target_n: this.corridor, limit_n: this.limit_n, comfort_n: this.comfort_n, compression });
     const air = !touching && this.force_n < 0.05;
-    find("force-value").replaceChildren(air ? "–" : this.force_n.toFixed(1), ...(air ? [] : [make("small", "", "N")]));
+    find("force-value").replaceChildren(air ? "–" : shown(this.force_n, 1), ...(air ? [] : [make("small", "", "N")]));
     const word = said.word;
     find("force-word").textContent = word;
     find("force-head").dataset.tone = said.tone;
     this.canvas.setAttribute("aria-valuenow", this.force_n.toFixed(1));
-    this.canvas.setAttribute("aria-valuetext", `${this.force_n.toFixed(1)} newtons, ${word}`);
+    this.canvas.setAttribute("aria-valuetext", t("force.newtons", { force: shown(this.force_n, 1), word }));
     this.paint();
     return said;
   }

@@ -6,6 +6,7 @@ import { beamOf, type Face, FLAT, halfOf, lineOf, placeOf } from "./lines";
 import type { Controls, GateKey, SpectrumFrame } from "./protocol";
 import type { DopplerSound } from "./sound";
 import { Wishes } from "./wish";
+import { decimal, t } from "./words/language";
 
 const STEP_MM = 0.5;
 const FAST_MM = 2;
@@ -38,8 +39,8 @@ export class GateOverlay {
   private readonly beam = draw("path", { class: "beam" });
   private readonly walls = draw("path", { class: "walls" });
   private readonly cursor = draw("path", { class: "cursor" });
-  private readonly body = draw("circle", { class: "grip", r: 15, tabindex: 0, role: "application", "aria-label": "Doppler gate: arrow keys move it" });
-  private readonly end = draw("circle", { class: "grip end", r: 10, tabindex: 0, role: "application", "aria-label": "Angle cursor: left and right turn it" });
+  private readonly body = draw("circle", { class: "grip", r: 15, tabindex: 0, role: "application", "aria-label": t("gate.move") });
+  private readonly end = draw("circle", { class: "grip end", r: 10, tabindex: 0, role: "application", "aria-label": t("gate.cursor") });
 
   constructor() {
     this.svg.append(this.beam, this.cursor, this.walls, this.body, this.end);
@@ -174,14 +175,14 @@ export class GateOverlay {
   }
 }
 
-const WORDS: [GateKey, string, string, (value: number) => string][] = [
-  ["gate_length_mm", "Gate", "length of the sample volume", (v) => `${v} mm`],
-  ["gate_steer_deg", "Beam", "lean of the Doppler beam", (v) => `${v.toFixed(0)}°`],
-  ["gate_angle_deg", "Angle", "between the beam and the cursor along the vessel", (v) => `${v.toFixed(0)}°`],
-  ["gate_scale_cm_s", "Scale", "velocity along the beam from which the spectrum folds", (v) => `${v.toFixed(0)} cm/s`],
-  ["gate_baseline", "Base", "where the base line lies", (v) => (v === 0 ? "middle" : v > 0 ? `low ${v}` : `high ${-v}`)],
-  ["gate_filter_hz", "Filter", "slower shifts are left out", (v) => `${v.toFixed(0)} Hz`],
-  ["gate_gain_db", "Gain", "brightness of the spectrum", (v) => `${v.toFixed(0)} dB`],
+const WORDS: [GateKey, "gate" | "beam" | "angle" | "scale" | "base" | "filter" | "gain", (value: number) => string][] = [
+  ["gate_length_mm", "gate", (v) => `${decimal(String(v))} mm`],
+  ["gate_steer_deg", "beam", (v) => `${v.toFixed(0)}°`],
+  ["gate_angle_deg", "angle", (v) => `${v.toFixed(0)}°`],
+  ["gate_scale_cm_s", "scale", (v) => `${v.toFixed(0)} cm/s`],
+  ["gate_baseline", "base", (v) => (v === 0 ? t("gate.middle") : v > 0 ? t("gate.low", { n: v }) : t("gate.high", { n: -v }))],
+  ["gate_filter_hz", "filter", (v) => `${v.toFixed(0)} Hz`],
+  ["gate_gain_db", "gain", (v) => `${v.toFixed(0)} dB`],
 ];
 
 /** The buttons of the gate and of its sound. */
@@ -197,11 +198,11 @@ export class GateTools {
   ) {
     press("pulsed", () => this.toggle());
     const box = find("gate-tools");
-    for (const [key, name, title] of WORDS) {
+    for (const [key, name] of WORDS) {
       const output = make("output");
       this.values.set(key, output);
-      const row = stepper(`gate-${name.toLowerCase()}`, name, output, (way) => this.step(key, way), title);
-      row.id = `gate-${name.toLowerCase()}`;
+      const row = stepper(`gate-${name}`, t(`gate.${name}`), output, (way) => this.step(key, way), t(`gate.${name}.title`));
+      row.id = `gate-${name}`;
       box.append(row);
     }
     press("doppler-sound", () => this.hear(!sound.on));
@@ -227,7 +228,7 @@ export class GateTools {
     pressed("pulsed", on);
     if (!on && this.sound.on) this.hear(false);
     for (const each of document.querySelectorAll<HTMLButtonElement>("#pulsed, #gate-tools .stepper button")) each.disabled = !controls.controls;
-    for (const [key, , , words] of WORDS) this.values.get(key)!.textContent = words(controls[key] ?? 0);
+    for (const [key, , words] of WORDS) this.values.get(key)!.textContent = words(controls[key] ?? 0);
     const steep = Math.abs(controls.gate_angle_deg ?? 0) > STEEP_DEG;
     this.values.get("gate_angle_deg")!.classList.toggle("warn", steep);
     if (controls.gate_angle_deg !== undefined) this.overlay.angle(controls.gate_angle_deg);

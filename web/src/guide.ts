@@ -4,6 +4,7 @@
 import { draw } from "./dom";
 import type { Face } from "./lines";
 import type { Picture, PictureMark } from "./protocol";
+import { t } from "./words/language";
 
 const ROW_PX = 15;
 const EDGE_PX = 6;
@@ -117,11 +118,11 @@ export class PictureGuide {
       const s = aside < 0 ? -1 : 1;
       const [x, y] = [s < 0 ? 18 : w - 18, h - 46];
       parts.push(draw("path", { class: "arrow", d: `M${x - s * 46} ${y - 7}h${s * 28}v-9l${s * 22} 16l${-s * 22} 16v-9h${-s * 28}z` }));
-      const words = `${Math.abs(aside).toFixed(0)} mm to this side`;
+      const words = t("guide.aside", { mm: Math.abs(aside).toFixed(0) });
       parts.push(draw("text", { class: "way", x: s < 0 ? 10 : w - 10, y: y + 32, "text-anchor": s < 0 ? "start" : "end" }, words));
     }
     if (along) {
-      const words = `Slide ${p.way}`;
+      const words = t("guide.slide", { way: p.way });
       const half = (words.length * 7.2) / 2 + 14;
       parts.push(draw("rect", { class: "plate", x: w / 2 - half, y: 8, width: 2 * half, height: 26, rx: 13 }), draw("text", { class: "way", x: w / 2, y: 26, "text-anchor": "middle" }, words));
     }

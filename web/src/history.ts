@@ -2,13 +2,14 @@
 
 import { button, draw, find, label, make, minutes } from "./dom";
 import type { ExamEntry } from "./protocol";
+import { language, t } from "./words/language";
 
 const CURVE = { width: 880, height: 110, left: 30, right: 10, top: 8, foot: 16 };
 
 /** Scores from the oldest to the newest exam. */
 function curve(list: ExamEntry[]): SVGElement {
   const scored = list.filter((e) => e.score !== null).reverse();
-  const svg = draw("svg", { viewBox: `0 0 ${CURVE.width} ${CURVE.height}`, role: "img", class: "curve", "aria-label": `Scores of ${scored.length} exams: ${scored.map((e) => e.score!.toFixed(0)).join(", ")}` });
+  const svg = draw("svg", { viewBox: `0 0 ${CURVE.width} ${CURVE.height}`, role: "img", class: "curve", "aria-label": t("history.scores", { n: scored.length, scores: scored.map((e) => e.score!.toFixed(0)).join(", ") }) });
   const span = CURVE.height - CURVE.top - CURVE.foot;
   const y = (score: number): number => CURVE.top + span * (1 - score / 100);
   const x = (i: number): number => CURVE.left + ((CURVE.width - CURVE.left - CURVE.right) * (i + 0.5)) / Math.max(1, scored.length);
@@ -48,14 +49,14 @@ export class HistoryDialog {
 
   private build(): void {
     const head = make("div", "head");
-    const title = make("h2", "", "My exams");
+    const title = make("h2", "", t("page.exams_button"));
     title.id = "exams-title";
     head.append(title, make("span", "spring"), this.who());
     const mine = this.trainee ? this.list.filter((e) => e.trainee === this.trainee) : this.list;
     const row = make("div", "actions");
-    const close = button("Close", () => this.box.close(), "primary");
+    const close = button(t("page.close"), () => this.box.close(), "primary");
     row.append(make("span", "spring"), close);
-    const nothing = make("p", "intro", "No exam yet. Each exam that you finish is kept here with its report and replay.");
+    const nothing = make("p", "intro", t("history.none"));
     this.box.replaceChildren(head, ...(mine.length ? [curve(mine), this.table(mine)] : [nothing]), row);
     if (this.box.open) close.focus();
   }
@@ -64,9 +65,9 @@ export class HistoryDialog {
     const names = [...new Set(this.list.map((e) => e.trainee))].sort();
     if (names.length < 2) return make("span");
     const select = make("select");
-    select.setAttribute("aria-label", "Learner");
+    select.setAttribute("aria-label", t("history.learner"));
     for (const name of ["", ...names.filter((n) => n)]) {
-      const option = make("option", "", name || "All learners");
+      const option = make("option", "", name || t("history.all"));
       option.value = name;
       option.selected = name === this.trainee;
       select.append(option);
@@ -81,11 +82,11 @@ export class HistoryDialog {
   private table(list: ExamEntry[]): HTMLElement {
     const scroll = make("div", "scroll");
     scroll.tabIndex = 0;
-    scroll.setAttribute("aria-label", "List of exams");
+    scroll.setAttribute("aria-label", t("history.list"));
     scroll.setAttribute("role", "region");
     const table = make("table");
     const head = make("tr");
-    for (const name of ["Date", "Case", "Learner", "Protocol", "Score", "Time", ""]) head.append(make("th", "", name));
+    for (const name of [t("history.date"), t("start.case"), t("history.learner"), t("start.protocol"), t("history.score"), t("history.time"), ""]) head.append(make("th", "", name));
     table.append(head, ...list.map((e) => this.row(e)));
     scroll.append(table);
     return scroll;
@@ -94,17 +95,17 @@ export class HistoryDialog {
   private row(e: ExamEntry): HTMLElement {
     const row = make("tr");
     const date = new Date(e.date);
-    const when = Number.isNaN(date.getTime()) ? e.date : date.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
-    const score = make("td", e.passed ? "good" : "bad", e.score === null ? "none" : `${e.score.toFixed(0)} ${e.passed ? "passed" : "not passed"}`);
+    const when = Number.isNaN(date.getTime()) ? e.date : date.toLocaleString(language, { dateStyle: "medium", timeStyle: "short" });
+    const score = make("td", e.passed ? "good" : "bad", e.score === null ? t("history.no_score") : t(e.passed ? "history.passed" : "history.not_passed", { score: e.score.toFixed(0) }));
     const does = make("td", "does");
-    const report = make("a", "button", "Report");
-    Object.assign(report, { href: e.report, target: "_blank", rel: "noopener" });
-    report.setAttribute("aria-label", `Report of ${e.title}, ${when}`);
-    const replay = button("Replay", () => (this.box.close(), this.replay(e.id)));
-    replay.setAttribute("aria-label", `Replay of ${e.title}, ${when}`);
+    const report = make("a", "button", t("history.report"));
+    Object.assign(report, { href: `${e.report}#lang=${language}`, target: "_blank", rel: "noopener" });
+    report.setAttribute("aria-label", t("history.report_of", { title: e.title, when }));
+    const replay = button(t("page.replay"), () => (this.box.close(), this.replay(e.id)));
+    replay.setAttribute("aria-label", t("history.replay_of", { title: e.title, when }));
     replay.disabled = !e.recording;
-    const files = button("Files", () => this.files(e));
-    files.setAttribute("aria-label", `Files of ${e.title}, ${when}`);
+    const files = button(t("export.files"), () => this.files(e));
+    files.setAttribute("aria-label", t("export.files_of_when", { title: e.title, when }));
     does.append(report, replay, files);
     row.append(make("td", "", when), make("td", "", e.title), make("td", "", e.trainee), make("td", "", label(e.protocol)), score, make("td", "", minutes(e.seconds)), does);
     return row;

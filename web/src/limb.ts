@@ -4,6 +4,7 @@
 import * as THREE from "three";
 import type { LimbInfo } from "./protocol";
 import { SOLID } from "./theme";
+import { t } from "./words/language";
 
 const POINTS = 28; // round a section
 const ANKLE_MM = 36; // radius of the ankle that the sections are of
@@ -67,4 +68,4 @@ export class Foot {
 }
 
 /** "Left leg, prone, the knee bent". */
-export const limbWords = (limb: LimbInfo): string => `${limb.side === "left" ? "Left" : "Right"} leg, ${limb.title}`;
+export const limbWords = (limb: LimbInfo): string => t(limb.side === "left" ? "leg.left" : "leg.right", { position: limb.title });

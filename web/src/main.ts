@@ -33,6 +33,7 @@ import { startTheme } from "./theme";
 import { Traces } from "./traces";
 import { letGo, ROLE_ACTIONS, roleWords } from "./words";
 import { Worksheet, type SheetMessage } from "./worksheet";
+import { amid, capital, decimal, dress, shown, t, translated, untold } from "./words/language";
 
 const HOME_SITE = 27;
 /** Stations of a limb where an exam begins: the groin, or what a position is for, behind the knee and the calf. */
@@ -217,7 +218,8 @@ class App {
 
   // ---- messages --------------------------------------------------------------------------------
 
-  private text(message: TextMessage): void {
+  private text(heard: TextMessage): void {
+    const message = translated(heard);
     if (message.type === "hello") this.greet(message);
     else if (message.type === "controls") this.setControls(message);
     else if (message.type === "exam") this.setExam(message);
@@ -229,14 +231,13 @@ class App {
   }
 
   private greet(hello: Hello): void {
-    if (!VERSIONS.includes(hello.version)) return this.say("this page belongs to another version: reload it");
+    if (!VERSIONS.includes(hello.version)) return this.say(t("main.reload"));
     const same = this.hello?.model === hello.model && this.hello.nodes === hello.nodes;
     this.placed = this.lost && same && this.placed; // the hand stays where it was
     this.lost = false;
     this.fresh = true;
     this.hello = hello;
-    find("about").textContent =
-      `Sonde ${hello.program}. Trains and simulates; not a medical device. Patients, images and forces are computed.`;
+    find("about").textContent = t("main.about", { version: hello.program });
     this.patient.greet(hello);
     this.scene.setLimb(hello.limb ?? null);
     find("leg-name").textContent = hello.limb ? limbWords(hello.limb) : "";
@@ -354,8 +355,8 @@ class App {
     this.dial.show(running ? exam.step.angle_deg : null, exam.step.angle_ok);
     const name = find("target-label");
     name.hidden = target === null;
-    const away = exam.step.offset_mm === null || reached ? "" : `${exam.step.offset_mm.toFixed(0)} mm away`;
-    if (target) name.textContent = away ? `${target.name}, ${away}` : target.name;
+    const away = exam.step.offset_mm === null || reached ? null : exam.step.offset_mm.toFixed(0);
+    if (target) name.textContent = away ? t("main.target_away", { place: target.name, mm: away }) : target.name;
     name.classList.toggle("reached", reached);
   }
 
@@ -379,8 +380,7 @@ class App {
     if (connected) find("banner").hidden = true;
     else {
       this.lost = true;
-      const running = this.phase === "running" ? " Your exam goes on when it is back." : " Is the program running?";
-      this.say(`The connection to Sonde is lost. Trying again in ${wait_s.toFixed(1)} s.${running}`, 0);
+      this.say(t(this.phase === "running" ? "main.lost_exam" : "main.lost", { seconds: shown(wait_s, 1) }), 0);
     }
   }
 
@@ -398,7 +398,7 @@ class App {
 
   private refused(): void {
     this.setConnected(false, 0);
-    this.say("This page has no access. Open the whole address that the program printed: it ends with # and 32 characters.", 0);
+    this.say(t("main.refused"), 0);
   }
 
   private sayTimer = 0;
@@ -456,15 +456,15 @@ class App {
     const played = phase === "replay" ? (this.replay?.title ?? "") : "";
     const shown = phase === "film" ? this.hello?.course?.find((l) => l.id === exam?.lesson?.id) : undefined;
     find("case-title").textContent = own ? exam.title : shown?.title || played || label(this.hello?.model ?? "");
-    find("case-history").textContent = own ? exam.history : shown ? shown.patient : played ? "" : "A simulated leg, to practise on";
+    find("case-history").textContent = own ? exam.history : shown ? shown.patient : played ? "" : t("main.practise_on");
     find("case").title = find("case-history").textContent ?? "";
     this.showRole();
     const device = this.hello?.device ?? "page";
-    if (device !== "page" && this.controls?.controls) find("hint").textContent = `The probe is moved by: ${device}.`;
+    if (device !== "page" && this.controls?.controls) find("hint").textContent = t("main.moved_by", { device });
     const clock = find("clock");
     clock.hidden = phase !== "running" && phase !== "done";
     clock.classList.toggle("recording", phase === "running" && (exam?.recording ?? false));
-    clock.title = exam?.recording ? "This exam is recorded" : "This exam is not recorded";
+    clock.title = exam?.recording ? t("main.recorded") : t("main.not_recorded");
     find("clock-text").textContent = minutes(exam?.elapsed_s ?? 0);
   }
 
@@ -488,7 +488,7 @@ class App {
     const on = this.phase === "preparing";
     find("preparing").hidden = !on;
     if (!on || !this.exam) return;
-    find("preparing-text").textContent = this.exam.message || "Preparing the case";
+    find("preparing-text").textContent = this.exam.message || t("main.preparing");
     find<HTMLProgressElement>("preparing-bar").value = this.exam.progress;
   }
 
@@ -510,7 +510,7 @@ class App {
     this.goalDue = true;
     if (this.snapshot) this.route.to(this.scene.skin, this.snapshot.position_mm, this.hold.point);
     if (this.snapshot && this.snapshot.tick > 0 && this.hold.depth_mm > 0) find("hint").classList.add("gone");
-    find("depth-value").textContent = `${this.hold.depth_mm.toFixed(1).replace(/\.0$/, "")} mm`;
+    find("depth-value").textContent = `${decimal(this.hold.depth_mm.toFixed(1).replace(/\.0$/, ""))} mm`;
     find<HTMLInputElement>("depth-slider").value = String(this.hold.depth_mm);
     this.updateCurve();
   }
@@ -571,9 +571,9 @@ class App {
     const near = nearestSite(this.hello?.sites ?? [], this.hold.point);
     const useful = near !== null && near.distance_mm < NEAR_MM;
     const points = useful ? (near.site.curves[probe] ?? []) : [];
-    const where = near ? `place ${near.site.id}${near.distance_mm >= 0.5 ? `, ${near.distance_mm.toFixed(0)} mm away` : ""}` : "";
-    const none = useful ? `not computed for the ${label(probe).toLowerCase()} probe` : "no computed curve nearby";
-    find("plot-site").textContent = points.length ? `${label(probe)} probe, ${where}` : none;
+    const where = near ? near.distance_mm >= 0.5 ? t("main.place_away", { n: near.site.id, mm: near.distance_mm.toFixed(0) }) : t("main.place", { n: near.site.id }) : "";
+    const none = useful ? t("main.not_computed", { probe: amid(label(probe)) }) : t("main.no_curve");
+    find("plot-site").textContent = points.length ? t("main.probe_at", { probe: label(probe), where }) : none;
     find("key-measured").hidden = points.length === 0;
     const key = points.length ? `${near!.site.id} ${probe}` : "";
     if (key !== this.curveKey || key === "") {
@@ -658,15 +658,16 @@ class App {
     this.shownOff = off;
     const box = find("fault");
     box.hidden = fault === 0 && !off;
-    const sentence = fault ? (this.hello?.faults[fault] ?? "") : "No probe can be pressed that far";
-    const next = fault ? "Press Resume to go on." : "Lift the probe off the leg to go on.";
+    const sentence = fault ? (this.hello?.faults[fault] ?? "") : t("main.too_far");
+    const next = fault ? t("main.resume") : t("main.lift");
     const advice = document.createElement("small");
-    advice.textContent = `The force has faded to zero. ${next}`;
-    box.replaceChildren(`${label(sentence)}.`, document.createElement("br"), advice);
+    advice.textContent = t("main.faded", { next });
+    box.replaceChildren(`${capital(sentence)}.`, document.createElement("br"), advice);
     if (fault || off) announce(`${sentence}. ${next}`);
   }
 }
 
+dress(document);
 const app = new App();
 
 /** For tests and for the console. Lengths are mm. */
@@ -679,6 +680,8 @@ const sonde = {
   get replay() { return app.replay; },
   get worksheet() { return app.worksheet.written; },
   get frames() { return app.frames; },
+  /** sentences of the program without a translation */
+  get untold() { return [...untold]; },
   /** changes whenever the echo image changes */
   get imageSum() { return app.pixels.reduce((sum, p, i) => (sum + p * ((i % 251) + 1)) % 1e9, 0); },
   get measures() { return app.echo.measures; },

@@ -3,6 +3,7 @@
 import type { EchoKey } from "./connection";
 import { label, make, release } from "./dom";
 import type { Controls, Snapshot } from "./protocol";
+import { shown, t } from "./words/language";
 
 /** A row of buttons of which one is pressed. */
 export class Chips {
@@ -49,11 +50,11 @@ interface SliderInfo {
 }
 
 const SLIDERS: SliderInfo[] = [
-  { key: "gain_db", name: "Gain", unit: "dB", low: -30, high: 30, step: 1 },
-  { key: "depth_mm", name: "Image depth", unit: "mm", low: 30, high: 120, step: 5 },
-  { key: "frequency_mhz", name: "Frequency", unit: "MHz", low: 2, high: 12, step: 0.5 },
-  { key: "dynamic_range_db", name: "Range", unit: "dB", low: 30, high: 90, step: 5 },
-  { key: "focus_mm", name: "Focus", unit: "mm", low: 5, high: 115, step: 1 },
+  { key: "gain_db", name: t("slider.gain"), unit: "dB", low: -30, high: 30, step: 1 },
+  { key: "depth_mm", name: t("slider.depth"), unit: "mm", low: 30, high: 120, step: 5 },
+  { key: "frequency_mhz", name: t("slider.frequency"), unit: "MHz", low: 2, high: 12, step: 0.5 },
+  { key: "dynamic_range_db", name: t("slider.range"), unit: "dB", low: 30, high: 90, step: 5 },
+  { key: "focus_mm", name: t("slider.focus"), unit: "mm", low: 5, high: 115, step: 1 },
   { key: "tgc_db_per_cm", name: "TGC", unit: "dB/cm", low: -10, high: 10, step: 0.5 },
 ];
 
@@ -71,7 +72,7 @@ export class Sliders {
     const row = make("label", "slider");
     const output = make("output");
     const input = document.createElement("input");
-    input.setAttribute("aria-label", `${info.name}, ${info.unit}`); // the label names its output
+    input.setAttribute("aria-label", t("slider.label", { name: info.name, unit: info.unit })); // the label names its output
     Object.assign(input, { type: "range", min: info.low, max: info.high, step: info.step });
     input.oninput = () => {
       this.write(output, info, input.valueAsNumber);
@@ -84,7 +85,7 @@ export class Sliders {
   }
 
   private write(output: HTMLElement, info: SliderInfo, value: number): void {
-    output.textContent = `${value.toFixed(info.step < 1 ? 1 : 0)} ${info.unit}`;
+    output.textContent = `${shown(value, info.step < 1 ? 1 : 0)} ${info.unit}`;
   }
 
   set(controls: Controls): void {
@@ -111,10 +112,10 @@ export class Readouts {
   private vessels = true;
 
   constructor(private readonly box: HTMLElement) {
-    this.pressed = this.gauge("Pressed in");
-    this.vein = this.gauge("Vein area", "vein");
-    this.diameter = this.gauge("Vein diameter", "vein");
-    this.artery = this.gauge("Artery area", "artery");
+    this.pressed = this.gauge(t("readout.pressed"));
+    this.vein = this.gauge(t("readout.vein_area"), "vein");
+    this.diameter = this.gauge(t("readout.vein_diameter"), "vein");
+    this.artery = this.gauge(t("readout.artery_area"), "artery");
   }
 
   private gauge(name: string, colour = ""): Gauge {
@@ -144,40 +145,22 @@ export class Readouts {
   private static number(gauge: Gauge, value: number, digits: number, unit: string, touching: boolean): void {
     const away = !touching || !Number.isFinite(value);
     gauge.row.classList.toggle("away", away);
-    const word = touching ? "not in view" : "–";
-    gauge.value.replaceChildren(away ? word : value.toFixed(digits), ...(away ? [] : [make("small", "", unit)]));
+    const word = touching ? t("readout.not_in_view") : "–";
+    gauge.value.replaceChildren(away ? word : shown(value, digits), ...(away ? [] : [make("small", "", unit)]));
   }
 
   show(s: Snapshot): void {
     const touching = s.contact_area_mm2 > 0;
     Readouts.number(this.pressed, Math.max(0, s.penetration_mm), 1, "mm", touching);
-    Readouts.number(this.vein, 100 * s.vein_area_ratio, 0, "% of rest", touching);
+    Readouts.number(this.vein, 100 * s.vein_area_ratio, 0, t("readout.of_rest"), touching);
     Readouts.number(this.diameter, Number.isNaN(s.vein_area_ratio) ? NaN : s.vein_short_mm, 1, "mm", touching);
-    Readouts.number(this.artery, 100 * s.artery_area_ratio, 0, "% of rest", touching);
+    Readouts.number(this.artery, 100 * s.artery_area_ratio, 0, t("readout.of_rest"), touching);
   }
 }
 
-const KEYS: [string, string][] = [
-  ["Drag on the leg", "slides the probe along the skin; a far click lifts it and sets it down there"],
-  ["Wheel, two fingers, Up / Down, W / S", "press deeper or shallower by 1 mm, with Shift by 5 mm"],
-  ["Right drag, hold Space, 0", "press progressively (Shift + Space lifts), let go"],
-  ["A / D, Left / Right", "slide across or along the leg"],
-  ["Q / E, T / G, Y / H", "rotate about the beam, tilt the beam"],
-  ["Drag beside the leg", "turns the view; Ctrl + wheel zooms; X see through; R reset"],
-  ["1 to 9, C", "choose the probe, next vein (free practice)"],
-  ["F, M, O, B", "freeze; measure a distance, an area (Delete clears); compare with now"],
-  ["P, V, Z", "patient's position, strain, gel (Shift + Z wipes)"],
-  ["Shift + P", "pulsed Doppler: gate and spectrum; its gate and cursor by arrow keys when focused"],
-  ["Shift + B, Shift + M", "colour, power; ; and ' their scale, - and = their gain, \\ the beam's lean"],
-  ["Shift + C, Shift + V", "squeeze the calf, deep breath"],
-  [", and .", "segment before, next segment"],
-  ["J, K, L", "finding: compressible, clot, not seen"],
-  ["N, [ and ], Shift + N", "store this image at the station, station before or next, worksheet"],
-  ["U, Shift + Enter", "hint, finish the exam"],
-  ["Replay: Space, Left / Right", "play or pause, 1 s back or on (Shift: 5 s)"],
-  ["I, Esc", "latency and frame rate; emergency stop (Resume goes on)"],
-];
+const KEYS = ["drag_leg", "wheel", "right_drag", "slide", "rotate", "beside", "choose", "image", "patient",
+  "pulsed", "colour", "hand", "segment", "finding", "sheet", "exam", "replay", "stop"] as const;
 
 export function fillHelp(box: HTMLElement): void {
-  for (const [keys, meaning] of KEYS) box.append(make("kbd", "", keys), make("span", "", meaning));
+  for (const key of KEYS) box.append(make("kbd", "", t(`help.${key}`)), make("span", "", t(`help.${key}.what`)));
 }

@@ -3,6 +3,7 @@
 import uPlot from "uplot";
 import { nameDrawing } from "./dom";
 import { ink, onTheme } from "./theme";
+import { t } from "./words/language";
 
 const TRACE_POINTS = 900;
 const MOST = { mm: 50, n: 60 }; // a point beyond stays at the edge
@@ -20,7 +21,7 @@ export class ForcePlot {
 
   constructor(private readonly box: HTMLElement) {
     this.plot = new uPlot(this.options(), [[0], [0]], box);
-    nameDrawing(box, "Force in newtons against how far the probe is pressed in, in millimetres: now, and as computed beforehand");
+    nameDrawing(box, t("plot.name"));
     new ResizeObserver(() => this.resize()).observe(box);
     onTheme(() => this.plot.redraw());
     this.resize();

@@ -4,12 +4,13 @@ import type { Connection, TissueKey } from "./connection";
 import { find, label, make, press, pressed, release } from "./dom";
 import { Chips } from "./panel";
 import type { Exam, Controls, Hello, Posture } from "./protocol";
+import { amid, shown, t } from "./words/language";
 
 const POSTURES: Posture[] = ["supine", "sitting", "standing"];
 const SCALES: { key: TissueKey; name: string }[] = [
-  { key: "stiffness_scale", name: "Stiffness" },
-  { key: "damping_scale", name: "Damping" },
-  { key: "friction_scale", name: "Friction" },
+  { key: "stiffness_scale", name: t("tissue.stiffness") },
+  { key: "damping_scale", name: t("tissue.damping") },
+  { key: "friction_scale", name: t("tissue.friction") },
 ];
 
 /** Chips have little room: "partial_mural" -> "Partial". */
@@ -38,7 +39,7 @@ export class PatientTools {
   }
 
   greet(hello: Hello): void {
-    const option = (name: string): HTMLOptionElement => Object.assign(make("option", "", label(name).toLowerCase()), { value: name });
+    const option = (name: string): HTMLOptionElement => Object.assign(make("option", "", amid(label(name))), { value: name });
     this.probes.replaceChildren(...hello.probes.map((p) => option(p.name)));
     this.cases.fill(hello.cases);
   }
@@ -55,7 +56,7 @@ export class PatientTools {
     pressed("valsalva", controls.valsalva ?? false);
     find("gel-box").hidden = !controls.gel;
     const ml = controls.gel_ml ?? 0;
-    find("gel-put").textContent = ml > 0.05 ? `Gel ${ml.toFixed(0)} ml` : "Gel";
+    find("gel-put").textContent = ml > 0.05 ? t("gel.ml", { ml: ml.toFixed(0) }) : t("page.gel_put");
     for (const id of ["probes", "posture", "valsalva", "gel-put", "gel-wipe"]) find<HTMLButtonElement>(id).disabled = !mine;
     find<HTMLButtonElement>("gel-wipe").disabled ||= ml < 0.05;
     find("tissue-button").hidden = controls.stiffness_scale === undefined;
@@ -63,7 +64,7 @@ export class PatientTools {
       const value = controls[key] ?? 1;
       input.disabled = !mine;
       if (document.activeElement !== input) input.value = String(value);
-      output.textContent = `${value.toFixed(2)} ×`;
+      output.textContent = `${shown(value, 2)} ×`;
     }
   }
 
@@ -104,15 +105,15 @@ export class PatientTools {
 
   private buildTissue(): void {
     const box = find("tissue");
-    box.append(make("p", "caption", "Times this leg's own values; 1 is the leg as it is."));
+    box.append(make("p", "caption", t("tissue.note")));
     for (const { key, name } of SCALES) {
       const row = make("label", "slider");
-      const output = make("output", "", "1.00 ×");
+      const output = make("output", "", `${shown(1, 2)} ×`);
       const input = make("input");
-      input.setAttribute("aria-label", `${name}, times this leg's own`);
+      input.setAttribute("aria-label", t("tissue.times", { name }));
       Object.assign(input, { type: "range", min: 0.5, max: 2, step: 0.05, value: 1 });
       input.oninput = () => {
-        output.textContent = `${input.valueAsNumber.toFixed(2)} ×`;
+        output.textContent = `${shown(input.valueAsNumber, 2)} ×`;
         this.connection.set(key, input.valueAsNumber);
       };
       input.onchange = () => release(input);
@@ -120,7 +121,7 @@ export class PatientTools {
       box.append(row);
       this.scales.set(key, { input, output });
     }
-    const reset = make("button", "", "As it is");
+    const reset = make("button", "", t("tissue.reset"));
     reset.type = "button";
     reset.onclick = () => SCALES.forEach(({ key }) => this.connection.set(key, 1));
     box.append(reset);

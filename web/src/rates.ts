@@ -1,6 +1,7 @@
 // Latency and frame rate, shown on request.
 
 import { find, recall, remember } from "./dom";
+import { t } from "./words/language";
 
 export class Rates {
   private shown = recall("rates") === "yes";
@@ -22,9 +23,9 @@ export class Rates {
     const images = (this.frames - this.at.frames) / dt_s;
     const fresh = this.at.s === 0;
     this.at = { s: now_s, tick, frames: this.frames };
-    const latency = Number.isNaN(latency_ms) ? "" : `, ${latency_ms.toFixed(0)} ms`;
-    const rates = fresh ? "measuring" : `${images.toFixed(0)} images/s, ${steps.toFixed(0)} steps/s${latency}`;
-    find("status-text").textContent = !connected ? "Not connected" : this.shown ? rates : "Connected";
+    const seen = { images: images.toFixed(0), steps: steps.toFixed(0) };
+    const rates = fresh ? t("rates.measuring") : Number.isNaN(latency_ms) ? t("rates.rates", seen) : t("rates.latency", { ...seen, ms: latency_ms.toFixed(0) });
+    find("status-text").textContent = !connected ? t("rates.not_connected") : this.shown ? rates : t("rates.connected");
     find("status").setAttribute("aria-pressed", String(this.shown));
   }
 }

@@ -4,6 +4,7 @@ import { announce, button, draw, find, make, minutes, press, recall, release, re
 import type { Comment, Exam, Press, PressResult, Replay } from "./protocol";
 import { Wishes } from "./wish";
 import { PRESS_WORDS } from "./words";
+import { t } from "./words/language";
 
 const SEEK_MS = 80; // while the slider is dragged
 
@@ -40,7 +41,7 @@ export class ReplayBar {
     };
     find<HTMLFormElement>("comment-form").onsubmit = (e) => this.submit(e);
     find<HTMLInputElement>("comment-author").value = recall("author");
-    find("replay-key").append(...(Object.keys(PRESS_WORDS) as PressResult[]).map((r) => make("span", r, PRESS_WORDS[r])), make("span", "comment", "comment"));
+    find("replay-key").append(...(Object.keys(PRESS_WORDS) as PressResult[]).map((r) => make("span", r, PRESS_WORDS[r])), make("span", "comment", t("replay.comment")));
   }
 
   /** While an exam runs, and at its result, a teacher or watcher comments on what is seen now. */
@@ -61,7 +62,7 @@ export class ReplayBar {
     this.scrub.max = String(replay.duration_s);
     if (!this.held) this.scrub.value = String(replay.time_s);
     this.time(this.held ? this.scrub.valueAsNumber : replay.time_s);
-    find("replay-play").textContent = replay.playing ? "Pause" : "Play";
+    find("replay-play").textContent = replay.playing ? t("film.pause") : t("page.replay_play");
     if (document.activeElement !== this.speed) this.speed.value = String(replay.speed);
     for (const id of ["replay-play", "replay-leave", "scrub", "replay-speed"])
       find<HTMLButtonElement>(id).disabled = !controls;
@@ -124,14 +125,14 @@ export class ReplayBar {
     const rows = list.map((c) => {
       const row = make("li");
       const go = button(minutes(c.t_s), () => this.actions.seek(c.t_s), "time");
-      go.setAttribute("aria-label", `Go to ${minutes(c.t_s)}`);
+      go.setAttribute("aria-label", t("replay.go", { time: minutes(c.t_s) }));
       go.disabled = !controls;
       const words = make("span", "", c.text);
       if (c.author) words.append(make("i", "", c.author));
       row.append(go, words);
       return row;
     });
-    const none = make("li", "none", "No comment yet. A remark stands at its time in the exam, for the learner to find.");
+    const none = make("li", "none", t("replay.none"));
     find("comment-list").replaceChildren(...(rows.length ? rows : [none]));
   }
 
@@ -149,7 +150,7 @@ export class ReplayBar {
     if (!text.value.trim() || time_s === undefined) return text.focus();
     this.actions.comment(time_s, text.value.trim(), author);
     remember("author", author);
-    announce(`Comment added at ${minutes(time_s)}`);
+    announce(t("replay.added", { time: minutes(time_s) }));
     text.value = "";
   }
 }

@@ -4,6 +4,7 @@
 import { button, draw, find, make } from "./dom";
 import type { Exam, PressResult, Result, ScorePart } from "./protocol";
 import { finding, PRESS_WORDS } from "./words";
+import { language, shown, t } from "./words/language";
 
 export interface ResultActions {
   replay(exam: string): void;
@@ -21,13 +22,13 @@ export interface ResultActions {
 function ring(result: Result): HTMLElement {
   const r = 46;
   const round = 2 * Math.PI * r;
-  const svg = draw("svg", { viewBox: "0 0 120 120", role: "img", "aria-label": `Score ${result.score.toFixed(0)} of 100` });
+  const svg = draw("svg", { viewBox: "0 0 120 120", role: "img", "aria-label": t("result.score_of", { score: result.score.toFixed(0) }) });
   const part = (round * Math.max(0, Math.min(100, result.score))) / 100;
   svg.append(
     draw("circle", { cx: 60, cy: 60, r, class: "track" }),
     draw("circle", { cx: 60, cy: 60, r, class: "part", "stroke-dasharray": `${part} ${round}`, transform: "rotate(-90 60 60)" }),
     draw("text", { x: 60, y: 66, "text-anchor": "middle", class: "score" }, result.score.toFixed(0)),
-    draw("text", { x: 60, y: 84, "text-anchor": "middle", class: "of" }, "of 100"),
+    draw("text", { x: 60, y: 84, "text-anchor": "middle", class: "of" }, t("result.of")),
   );
   const box = make("div", `ring ${result.passed ? "good" : "bad"}`);
   box.append(svg);
@@ -36,7 +37,8 @@ function ring(result: Result): HTMLElement {
 
 /** The head already says whether it is passed. */
 function beyondVerdict(summary: string): string {
-  const rest = summary.replace(/^(Passed\.|Not passed:) */, "");
+  const said = [`${t("result.passed")}. `, `${t("result.not_passed")}: `].find((head) => summary.startsWith(head)) ?? "";
+  const rest = summary.slice(said.length);
   return rest.charAt(0).toUpperCase() + rest.slice(1);
 }
 
@@ -45,18 +47,18 @@ function tally(exam: Exam): string {
   const count = new Map<PressResult, number>();
   for (const p of exam.presses) count.set(p.result, (count.get(p.result) ?? 0) + 1);
   const parts = [...count].map(([result, n]) => `${n} × ${PRESS_WORDS[result]}`);
-  return parts.length ? parts.join(", ") : "no compression";
+  return parts.length ? parts.join(", ") : t("result.no_compression");
 }
 
 function segments(exam: Exam): HTMLElement {
   const table = make("table");
   const head = make("tr");
-  for (const name of ["Segment", "Compressions", "Your finding"]) head.append(make("th", "", name));
+  for (const name of [t("result.segment"), t("result.compressions"), t("result.your_finding")]) head.append(make("th", "", name));
   table.append(head);
   for (const s of exam.segments.filter((x) => x.needed || x.decision || x.done)) {
     const row = make("tr");
     const done = s.done >= s.points;
-    row.append(make("td", "", s.title), make("td", done ? "good" : "warn", `${s.done} of ${s.points}`), make("td", s.decision ? "" : "warn", finding(s.decision)));
+    row.append(make("td", "", s.title), make("td", done ? "good" : "warn", t("result.n_of", { n: s.done, of: s.points })), make("td", s.decision ? "" : "warn", finding(s.decision)));
     table.append(row);
   }
   return table;
@@ -66,13 +68,13 @@ function segments(exam: Exam): HTMLElement {
 function parts(list: ScorePart[]): HTMLElement {
   const table = make("table", "parts");
   const head = make("tr");
-  for (const name of ["Score", "Points", "Where points went"]) head.append(make("th", "", name));
+  for (const name of [t("result.score"), t("result.points"), t("result.where")]) head.append(make("th", "", name));
   table.append(head);
   for (const p of list) {
     const row = make("tr");
     const full = p.lost === "";
-    const lost = full ? "nothing lost" : `−${(p.of - p.points).toFixed(1)}: ${p.lost}`;
-    row.append(make("td", "", p.title), make("td", full ? "good" : "warn", `${p.points.toFixed(1)} of ${p.of}`), make("td", "", lost));
+    const lost = full ? t("result.nothing_lost") : t("result.lost", { points: shown(p.of - p.points, 1), why: p.lost });
+    row.append(make("td", "", p.title), make("td", full ? "good" : "warn", t("result.n_of", { n: shown(p.points, 1), of: p.of })), make("td", "", lost));
     table.append(row);
   }
   return table;
@@ -82,8 +84,8 @@ function parts(list: ScorePart[]): HTMLElement {
 function barWords(exam: Exam): HTMLElement {
   const { bar, reached } = exam.lesson!;
   const box = make("p", `bar-result ${reached ? "good" : "warn"}`);
-  const alone = exam.guidance === "exam" ? "" : " It counts in the repetition without help.";
-  box.append(make("b", "", reached ? "The bar is reached. " : "Below the bar. "), `${bar!.score} points and the right diagnosis are asked for; the expert came to ${bar!.mean.toFixed(1)} ± ${bar!.sd.toFixed(1)} in ${bar!.runs} examinations.${alone}`);
+  const alone = exam.guidance === "exam" ? "" : ` ${t("result.bar_alone")}`;
+  box.append(make("b", "", `${reached ? t("result.bar_reached") : t("result.bar_missed")} `), t("result.bar_words", { points: bar!.score, mean: shown(bar!.mean, 1), sd: shown(bar!.sd, 1), runs: bar!.runs }) + alone);
   return box;
 }
 
@@ -106,7 +108,7 @@ export class ResultDialog {
     const key = `${exam.exam} ${controls} ${comments} ${this.actions.worksheet() !== null}`;
     if (!result || key === this.shown) return;
     this.shown = key;
-    const head = make("h2", result.passed ? "good" : "bad", result.passed ? "Passed" : "Not passed");
+    const head = make("h2", result.passed ? "good" : "bad", result.passed ? t("result.passed") : t("result.not_passed"));
     head.id = "result-title";
     const words = make("div", "words");
     words.append(head, make("p", "case-name", exam.title), make("p", "summary", beyondVerdict(result.summary)));
@@ -118,33 +120,33 @@ export class ResultDialog {
     if (result.parts) body.push(parts(result.parts));
     const sheet = exam.lesson ? null : this.actions.worksheet();
     if (sheet) body.push(sheet);
-    this.box.replaceChildren(...body, segments(exam), make("p", "tally", `Compressions: ${tally(exam)}.`), this.foot(exam, result, controls, comments));
+    this.box.replaceChildren(...body, segments(exam), make("p", "tally", t("result.tally", { tally: tally(exam) })), this.foot(exam, result, controls, comments));
     if (!this.box.open) this.box.showModal();
     this.box.querySelector<HTMLElement>("a.primary")?.focus();
   }
 
   private diagnosis(result: Result): HTMLElement {
     const box = make("dl", result.correct ? "good" : "bad");
-    box.append(make("dt", "", "You said"), make("dd", "", result.diagnosis.asked), make("dt", "", "The truth"), make("dd", "", result.diagnosis.truth));
-    const verdict = make("strong", "", result.correct ? "Right diagnosis" : "Wrong diagnosis");
+    box.append(make("dt", "", t("result.said")), make("dd", "", result.diagnosis.asked), make("dt", "", t("result.truth")), make("dd", "", result.diagnosis.truth));
+    const verdict = make("strong", "", result.correct ? t("result.right") : t("result.wrong"));
     box.append(verdict);
     return box;
   }
 
   private foot(exam: Exam, result: Result, controls: boolean, comments: boolean): HTMLElement {
     const row = make("div", "actions");
-    const report = make("a", "primary button", "Open the report");
-    Object.assign(report, { href: result.report, target: "_blank", rel: "noopener" });
+    const report = make("a", "primary button", t("result.report"));
+    Object.assign(report, { href: `${result.report}#lang=${language}`, target: "_blank", rel: "noopener" });
     const l = exam.lesson;
     const later = [
-      button("Watch the replay", () => this.actions.replay(exam.exam)),
-      button("Try again", () => (l ? this.actions.repeat(l.id, l.turn) : this.actions.again(exam.case))),
-      l ? button("On with the lesson", () => this.actions.lesson(l.id)) : button("Next case", () => this.actions.next(exam.case)),
+      button(t("result.replay"), () => this.actions.replay(exam.exam)),
+      button(t("result.again"), () => (l ? this.actions.repeat(l.id, l.turn) : this.actions.again(exam.case))),
+      l ? button(t("film.on"), () => this.actions.lesson(l.id)) : button(t("result.next"), () => this.actions.next(exam.case)),
     ];
     later[0]!.disabled = !exam.recording;
     for (const b of later) b.disabled ||= !controls;
-    if (comments) later.push(button("Comment", () => (this.box.close(), this.actions.comment())));
-    row.append(report, ...later, make("span", "spring"), button("Close", () => (this.box.close(), controls && this.actions.close())));
+    if (comments) later.push(button(t("page.comment"), () => (this.box.close(), this.actions.comment())));
+    row.append(report, ...later, make("span", "spring"), button(t("page.close"), () => (this.box.close(), controls && this.actions.close())));
     return row;
   }
 }

@@ -3,13 +3,14 @@
 import * as THREE from "three";
 import type { LimbInfo } from "./protocol";
 import { ink } from "./theme";
+import { t } from "./words/language";
 
 const HEIGHT_PX = 44; // of the drawn letters; shown at a third
 const SIZE = 0.032; // of the picture's height
 const AWAY_MM = 14; // from the skin
 const END_MM = 15; // of the leg that belongs to an end
 const THIGH_MM = 500; // a longer leg goes on below the knee
-const INNER = "inner side", OUTER = "outer side";
+const INNER = t("leg.inner"), OUTER = t("leg.outer");
 
 function words(text: string): THREE.Sprite {
   const canvas = document.createElement("canvas");
@@ -53,15 +54,15 @@ export class Sides {
     const box = new THREE.Box3().setFromArray(points);
     const middle = box.getCenter(new THREE.Vector3());
     const at: [string, number, number, number, number][] = [
-      ["Groin", middle.x, topNear(points, box.min.z) + AWAY_MM, box.min.z, 0],
-      [box.max.z - box.min.z > THIGH_MM ? "Ankle" : "Knee", middle.x, topNear(points, box.max.z) + AWAY_MM, box.max.z, 0],
+      [t("leg.groin"), middle.x, topNear(points, box.min.z) + AWAY_MM, box.min.z, 0],
+      [box.max.z - box.min.z > THIGH_MM ? t("leg.ankle") : t("leg.knee"), middle.x, topNear(points, box.max.z) + AWAY_MM, box.max.z, 0],
       [INNER, 0, middle.y, middle.z, 1],
       [OUTER, 0, middle.y, middle.z, -1],
     ];
     if (this.limb) {
       const [cap, out, foot] = [this.limb.kneecap_mm, this.limb.forward, this.limb.ankle_mm];
-      at.push(["Kneecap", cap[0] + 2 * AWAY_MM * out[0], cap[1] + 2 * AWAY_MM * out[1], cap[2] + 2 * AWAY_MM * out[2], 0]);
-      at[1] = [`${this.limb.side === "left" ? "Left" : "Right"} foot`, foot[0], foot[1], foot[2] + 8 * AWAY_MM, 0];
+      at.push([t("leg.kneecap"), cap[0] + 2 * AWAY_MM * out[0], cap[1] + 2 * AWAY_MM * out[1], cap[2] + 2 * AWAY_MM * out[2], 0]);
+      at[1] = [this.limb.side === "left" ? t("leg.left_foot") : t("leg.right_foot"), foot[0], foot[1], foot[2] + 8 * AWAY_MM, 0];
     }
     this.group.clear();
     for (const [text, x, y, z, side] of at) {

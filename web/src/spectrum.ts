@@ -6,6 +6,7 @@ import { read, smoothed, type Readings } from "./readings";
 import type { Controls, SpectrumColumn, SpectrumFrame } from "./protocol";
 import type { DopplerSound } from "./sound";
 import { ink } from "./theme";
+import { decimal, shown, t } from "./words/language";
 
 const KEPT = 1000; // columns: 10 s
 const SHOWN_S = 6;
@@ -46,9 +47,9 @@ export class SpectrumView {
     this.strip.width = KEPT;
     this.strip.height = BINS;
     this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute("aria-label", "Doppler spectrum: velocity over time");
+    this.canvas.setAttribute("aria-label", t("spectrum.name"));
     const handle = (name: string): SVGElement => draw("rect", { class: "grip", tabindex: 0, role: "slider", "aria-label": name, "aria-valuenow": 0 });
-    this.handles = { from: handle("Start of the interval"), to: handle("End of the interval"), level: handle("Line of velocity") };
+    this.handles = { from: handle(t("spectrum.from")), to: handle(t("spectrum.to")), level: handle(t("spectrum.level")) };
     this.lines = { from: draw("line"), to: draw("line"), level: draw("line") };
     for (const key of ["from", "to", "level"] as const) {
       const grip = this.handles[key];
@@ -228,7 +229,7 @@ export class SpectrumView {
       const step = roundStep(2 * limit * scale, Math.max(3, high / 30));
       for (let v = Math.ceil((low * scale) / step) * step; v <= (low + 2 * limit) * scale; v += step) {
         const y = high * (1 - this.shareOf(v / scale));
-        if (y > 12 && y < high - 3) c.fillText(`${Math.round(v * 10) / 10 || 0}`, LEFT_PX - 7, y);
+        if (y > 12 && y < high - 3) c.fillText(decimal(`${Math.round(v * 10) / 10 || 0}`), LEFT_PX - 7, y);
         c.fillRect(LEFT_PX - 5, Math.round(y), 4, 1);
       }
       c.fillText("cm/s", LEFT_PX - 7, 6);
@@ -301,11 +302,11 @@ export class SpectrumView {
     find("spectrum-readings").hidden = !held;
     if (!r) return;
     const steep = Math.abs(this.controls?.gate_angle_deg ?? 0) > STEEP_DEG;
-    const texts: [string, string][] = [["Peak", `${r.peak.toFixed(1)} cm/s`], ["Mean", `${r.mean.toFixed(1)} cm/s`]];
-    if (Number.isFinite(r.phasicity)) texts.push(["Phasicity", r.phasicity.toFixed(2)]);
-    if (Number.isFinite(r.augmentation)) texts.push(["Squeeze", `× ${r.augmentation.toFixed(1)}`]);
-    texts.push(["Reverse", `${r.reflux_s.toFixed(2)} of ${r.seconds.toFixed(2)} s`], ["Line", `${this.level.toFixed(1)} cm/s`]);
-    if (steep) texts.push(["Angle", "beyond 60°: unsure"]);
+    const texts: [string, string][] = [[t("spectrum.peak"), `${shown(r.peak, 1)} cm/s`], [t("spectrum.mean"), `${shown(r.mean, 1)} cm/s`]];
+    if (Number.isFinite(r.phasicity)) texts.push([t("spectrum.phasicity"), shown(r.phasicity, 2)]);
+    if (Number.isFinite(r.augmentation)) texts.push([t("spectrum.squeeze"), `× ${shown(r.augmentation, 1)}`]);
+    texts.push([t("spectrum.reverse"), t("spectrum.reverse_of", { s: shown(r.reflux_s, 2), of: shown(r.seconds, 2) })], [t("spectrum.line"), `${shown(this.level, 1)} cm/s`]);
+    if (steep) texts.push([t("spectrum.angle"), t("spectrum.steep")]);
     const key = texts.join();
     if (this.words.dataset.key === key) return;
     this.words.dataset.key = key;

@@ -5,6 +5,7 @@ import { button, find, make, recall, remember } from "./dom";
 import type { CaseInfo, Guidance, Hello } from "./protocol";
 import { CourseView, type CourseActions } from "./course";
 import { GUIDANCE, LEVELS } from "./words";
+import { choose, language, LANGUAGES, t, type Language } from "./words/language";
 
 interface Choice {
   id: string;
@@ -41,6 +42,17 @@ function chips(label: string, choices: { id: string; title: string }[], chosen: 
     chip.setAttribute("aria-pressed", String(c.id === chosen));
     box.append(chip);
   }
+  return box;
+}
+
+/** The language of the page: each by its own name. */
+function languages(): HTMLElement {
+  const box = make("select");
+  box.id = "language";
+  box.setAttribute("aria-label", t("language.label"));
+  for (const [id, name] of Object.entries(LANGUAGES)) box.append(Object.assign(make("option", "", name), { value: id, lang: id }));
+  box.value = language;
+  box.onchange = () => choose(box.value as Language);
   return box;
 }
 
@@ -139,12 +151,12 @@ export class StartDialog {
 
   private head(): HTMLElement {
     const row = make("div", "start-head");
-    const head = make("h2", "", "What do you want to do?");
+    const head = make("h2", "", t("start.title"));
     head.id = "start-title";
-    row.append(head);
+    row.append(head, languages());
     if (!this.course.any) return row;
-    const views = [{ id: "course", title: "Course" }, { id: "exams", title: "Single exams" }];
-    row.append(chips("Course or single exams", views, this.taught ? "course" : "exams", (view) => {
+    const views = [{ id: "course", title: t("start.course") }, { id: "exams", title: t("start.exams") }];
+    row.append(chips(t("start.course_or_exams"), views, this.taught ? "course" : "exams", (view) => {
       this.taught = view === "course";
       remember("start", view);
       if (this.hello) this.build(this.hello);
@@ -153,20 +165,20 @@ export class StartDialog {
   }
 
   private exams(hello: Hello): void {
-    const intro = recall("trained") ? "Choose a case, or practise freely." : "New here? Press Start: the page leads you through a first exam.";
+    const intro = recall("trained") ? t("start.choose") : t("start.new");
     const all = hello.case_list ?? [];
     const levels = [...new Set(all.map((c: CaseInfo) => c.level))];
     const cases = this.seen(all).map((c: CaseInfo) => ({ id: c.id, title: c.title, text: c.history, tag: LEVELS[c.level] }));
     const row = make("div", "start-head");
-    const choices = [{ id: "", title: `All ${all.length} cases` }, ...levels.map((id) => ({ id: id as string, title: LEVELS[id] }))];
+    const choices = [{ id: "", title: t("start.all", { n: all.length }) }, ...levels.map((id) => ({ id: id as string, title: LEVELS[id] }))];
     row.append(make("p", "intro", intro));
-    if (levels.length > 1) row.append(chips("Cases of which level", choices, this.level, (level) => this.choose(level, hello)));
-    const left = cards("case", "Case", cases, this.wish.case, (id) => (this.wish.case = id));
+    if (levels.length > 1) row.append(chips(t("start.levels"), choices, this.level, (level) => this.choose(level, hello)));
+    const left = cards("case", t("start.case"), cases, this.wish.case, (id) => (this.wish.case = id));
     const right = make("div", "options");
     const guidance = (Object.keys(GUIDANCE) as Guidance[]).map((id) => ({ id, title: GUIDANCE[id][0], text: GUIDANCE[id][1] }));
     right.append(
-      cards("protocol", "Protocol", hello.protocols ?? [], this.wish.protocol, (id) => (this.wish.protocol = id)),
-      cards("guidance", "Guidance", guidance, this.wish.guidance, (id) => (this.wish.guidance = id as Guidance)),
+      cards("protocol", t("start.protocol"), hello.protocols ?? [], this.wish.protocol, (id) => (this.wish.protocol = id)),
+      cards("guidance", t("start.guidance"), guidance, this.wish.guidance, (id) => (this.wish.guidance = id as Guidance)),
       this.name(),
     );
     const columns = make("div", "columns");
@@ -189,19 +201,19 @@ export class StartDialog {
   private name(): HTMLElement {
     const box = make("label", "field");
     const input = make("input");
-    Object.assign(input, { id: "trainee", maxLength: 40, value: this.wish.trainee, placeholder: "so that your exams are kept together", autocomplete: "off" });
+    Object.assign(input, { id: "trainee", maxLength: 40, value: this.wish.trainee, placeholder: t("start.name_hint"), autocomplete: "off" });
     input.oninput = () => (this.wish.trainee = input.value.trim());
     input.onkeydown = (e) => e.key === "Enter" && this.go();
-    box.append(make("span", "caption", "Your name"), input);
+    box.append(make("span", "caption", t("page.your_name")), input);
     return box;
   }
 
   private foot(): HTMLElement {
     const row = make("div", "actions");
-    const go = button(this.taught ? this.course.goWords : "Start the exam", () => this.go(), "primary big");
+    const go = button(this.taught ? this.course.goWords : t("start.go"), () => this.go(), "primary big");
     go.id = "start-go";
-    const free = button("Free practice", () => (this.box.close(), this.practise()));
-    const note = this.taught ? this.course.foot() : [make("span", "caption note", "No score, every vein, every setting")];
+    const free = button(t("page.free_practice"), () => (this.box.close(), this.practise()));
+    const note = this.taught ? this.course.foot() : [make("span", "caption note", t("start.free_note"))];
     row.append(free, ...note, make("span", "spring"), go);
     return row;
   }

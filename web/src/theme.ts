@@ -2,6 +2,7 @@
 // paint. The colours of the page are in palette.css, those of solid things in the picture of the leg below.
 
 import { announce, find, press, recall, remember } from "./dom";
+import { t } from "./words/language";
 
 /** Of solid things under the lights of the leg's picture. */
 export const SOLID = {
@@ -65,11 +66,11 @@ function apply(): void {
   if (kept) document.documentElement.dataset.theme = kept;
   else delete document.documentElement.dataset.theme;
   inks.clear();
-  const next = theme() === "light" ? "Dark" : "Light";
+  const next = theme() === "light" ? "dark" : "light";
   const button = find("theme-button");
-  button.textContent = next;
-  button.title = `${next} theme`;
-  button.setAttribute("aria-label", `${next} theme`);
+  button.textContent = t(`theme.${next}`);
+  button.title = t(`theme.${next}.label`);
+  button.setAttribute("aria-label", t(`theme.${next}.label`));
   for (const changed of listeners) changed();
 }
 
@@ -79,7 +80,7 @@ export function startTheme(): void {
     const next: Theme = theme() === "light" ? "dark" : "light";
     remember("theme", next);
     apply();
-    announce(`${next === "light" ? "Light" : "Dark"} theme.`);
+    announce(t(`theme.${next}.said`));
   });
   system.addEventListener("change", apply);
   apply();

@@ -4,6 +4,7 @@ import uPlot from "uplot";
 import { find, nameDrawing } from "./dom";
 import type { Snapshot } from "./protocol";
 import { ink, onTheme } from "./theme";
+import { t } from "./words/language";
 
 const SPAN_S = 15;
 const REDRAW_S = 0.1;
@@ -21,7 +22,7 @@ export class Traces {
 
   constructor() {
     this.plot = new uPlot(this.options(), [[], [], []], this.box);
-    nameDrawing(this.box, "Force in newtons and vein area in percent over the last 15 seconds");
+    nameDrawing(this.box, t("traces.name"));
     new ResizeObserver(() => this.resize()).observe(this.box);
     onTheme(() => this.plot.redraw());
     this.resize();
@@ -49,7 +50,7 @@ export class Traces {
       scales: { x: { time: false, range }, n: { range: () => [0, this.top_n] }, vein: { range: () => [0, 120] } },
       axes: [
         { ...axis, size: 22, gap: 2, align: 2, splits: () => [0, 3, 6, 9, 12].map((s) => range()[1] - s).reverse(),
-          values: (_u, ticks) => ticks.map((t) => { const ago = Math.round(range()[1] - t); return ago === 0 ? "now" : `${ago} s`; }) },
+          values: (_u, ticks) => ticks.map((at) => { const ago = Math.round(range()[1] - at); return ago === 0 ? t("plot.now") : `${ago} s`; }) },
         { ...axis, scale: "n", size: 38, gap: 4, stroke: () => ink("accent"), values: last("N") },
         { ...axis, scale: "vein", side: 1, size: 44, gap: 4, stroke: () => ink("vein"), grid: { show: false }, splits: [0, 50, 100], values: last("%") },
       ],

@@ -1,43 +1,44 @@
 // What the page calls results, findings and levels.
 
 import type { CaseInfo, Compression, Controls, Decision, Guidance, PressResult, RoleAction } from "./protocol";
+import { t } from "./words/language";
 
 export const FINDINGS: { decision: Exclude<Decision, "">; name: string; help: string; key: string; code: string }[] = [
-  { decision: "compressible", name: "Compressible", help: "The walls of the vein touched: no clot here", key: "J", code: "KeyJ" },
-  { decision: "clot", name: "Clot", help: "Pressed with the force that closes a healthy vein, it stayed open", key: "K", code: "KeyK" },
-  { decision: "not_seen", name: "Not seen", help: "The vein was not seen well enough to tell", key: "L", code: "KeyL" },
+  { decision: "compressible", name: t("finding.compressible"), help: t("finding.compressible.help"), key: "J", code: "KeyJ" },
+  { decision: "clot", name: t("finding.clot"), help: t("finding.clot.help"), key: "K", code: "KeyK" },
+  { decision: "not_seen", name: t("finding.not_seen"), help: t("finding.not_seen.help"), key: "L", code: "KeyL" },
 ];
 
-export const finding = (d: Decision): string => FINDINGS.find((f) => f.decision === d)?.name ?? "No finding";
+export const finding = (d: Decision): string => FINDINGS.find((f) => f.decision === d)?.name ?? t("finding.none");
 
 export const PRESS_WORDS: Record<PressResult, string> = {
-  complete: "vein closed",
-  open: "vein stayed open",
-  insufficient: "not far enough",
-  too_hard: "too hard",
-  off_axis: "not straight across the vein",
+  complete: t("press.complete"),
+  open: t("press.open"),
+  insufficient: t("press.insufficient"),
+  too_hard: t("press.too_hard"),
+  off_axis: t("press.off_axis"),
 };
 
 export const ROLE_ACTIONS: Record<RoleAction, [string, string]> = {
-  take: ["Take control", "You move the probe; the one who has control now watches"],
-  give: ["Give control", "To the teacher, or to who watches longest"],
-  return: ["Give control back", "To the learner"],
+  take: [t("role.take"), t("role.take.help")],
+  give: [t("role.give"), t("role.give.help")],
+  return: [t("role.return"), t("role.return.help")],
 };
 
 /** What a page says about control; empty for a learner who has it. */
 export function roleWords(c: Controls): string {
-  if (c.controls) return c.role === "teacher" ? "Teacher: you have control" : c.role === "watcher" ? "You have control" : "";
-  const has = c.holder === "teacher" ? "The teacher has control" : c.holder === "watcher" ? "A watcher has control" : c.holder === "nobody" ? "Nobody has control" : "";
-  if (c.role === "learner") return has || "Watching";
-  return `${c.role === "teacher" ? "Teacher, watching" : "Watching"}${has && c.holder !== c.role ? `. ${has}` : ""}`;
+  if (c.controls) return c.role === "teacher" ? t("role.teacher_has_own") : c.role === "watcher" ? t("role.you_have") : "";
+  const has = c.holder === "teacher" ? t("role.teacher_has") : c.holder === "watcher" ? t("role.watcher_has") : c.holder === "nobody" ? t("role.nobody_has") : "";
+  if (c.role === "learner") return has || t("page.watching");
+  return `${c.role === "teacher" ? t("role.teacher_watching") : t("page.watching")}${has && c.holder !== c.role ? `. ${has}` : ""}`;
 }
 
-export const LEVELS: Record<CaseInfo["level"], string> = { first: "First exam", easy: "Easy", hard: "Hard" };
+export const LEVELS: Record<CaseInfo["level"], string> = { first: t("level.first"), easy: t("level.easy"), hard: t("level.hard") };
 
 export const GUIDANCE: Record<Guidance, [string, string]> = {
-  full: ["Full", "A ring shows where, a needle the angle, a bracket the force."],
-  hints: ["Hints", "The next point is named; more only when you ask for a hint."],
-  exam: ["None", "As in an exam: the protocol and your own eyes."],
+  full: [t("guidance.full"), t("guidance.full.help")],
+  hints: [t("guidance.hints"), t("guidance.hints.help")],
+  exam: [t("guidance.exam"), t("guidance.exam.help")],
 };
 
 /** The press of now has shown what it can. */

@@ -5,6 +5,7 @@ import { token } from "./access";
 import { announce, button, find, make, minutes, press, release } from "./dom";
 import type { Decision, Exam } from "./protocol";
 import { AGE_WORDS, CONCLUSION_WORDS, drawPicture, drawSheet, FINDING_WORDS, isClot, KIND_WORDS, newest, REFLUX_WORDS, sideWord, type About, type Finding, type Sheet, type SheetPicture, type SheetPlace } from "./report/worksheet";
+import { decimal, original, shown, t } from "./words/language";
 
 export interface SheetMessage extends Sheet {
   type: "worksheet";
@@ -24,7 +25,7 @@ export interface SheetActions {
 
 const WAIT_MS = 500; // after the last key of a text
 const FOUND: { finding: Exclude<Finding, "">; name: string }[] = [
-  { finding: "compressible", name: "Closes" }, { finding: "partly", name: "Partly" }, { finding: "not_compressible", name: "Stays open" }, { finding: "not_seen", name: "Not seen" },
+  { finding: "compressible", name: t("sheet.closes") }, { finding: "partly", name: t("sheet.partly") }, { finding: "not_compressible", name: t("sheet.stays_open") }, { finding: "not_seen", name: t("sheet.not_seen") },
 ];
 
 /** A list whose first choice is nothing. */
@@ -96,7 +97,7 @@ export class Worksheet {
     }
     if (!other && message.pictures.length > before) {
       const p = message.pictures[message.pictures.length - 1]!;
-      announce(`Stored: ${message.places[p.place]!.title}, ${p.view} compression, ${p.force_n.toFixed(1)} newtons`);
+      announce(t(p.view === "with" ? "sheet.stored_with" : "sheet.stored_without", { place: message.places[p.place]!.title, force: shown(p.force_n, 1) }));
     }
     void this.load();
     this.fill();
@@ -157,8 +158,8 @@ export class Worksheet {
     const sheet = this.sheet;
     if (!sheet) return "";
     const bare = sheet.places.filter((_p, i) => !newest(sheet, i, "without") || !newest(sheet, i, "with")).length;
-    const words = [bare ? `${bare} of ${sheet.places.length} stations have no pair of pictures` : "", sheet.conclusion ? "" : "there is no conclusion"].filter(Boolean);
-    return words.length ? `Worksheet: ${words.join(", and ")}.` : "";
+    if (bare) return t(sheet.conclusion ? "sheet.gaps_pictures" : "sheet.gaps_both", { n: bare, of: sheet.places.length });
+    return sheet.conclusion ? "" : t("sheet.gaps_conclusion");
   }
 
   /** Of the result: the worksheet's own score, and the way to it. */
@@ -166,7 +167,7 @@ export class Worksheet {
     const v = this.sheet?.verdict;
     if (!v || !this.sheet?.written) return null;
     const box = make("p", "tally sheet-summary");
-    box.append(make("b", v.conclusion_right ? "good" : "bad", `Worksheet: ${v.score.toFixed(0)} of 100. `), v.summary, " ", button("Open the worksheet", () => this.preview()));
+    box.append(make("b", v.conclusion_right ? "good" : "bad", `${t("sheet.score", { score: v.score.toFixed(0) })} `), v.summary, " ", button(t("sheet.open"), () => this.preview()));
     return box;
   }
 
@@ -205,7 +206,7 @@ export class Worksheet {
     if (!this.controls || !this.sheet) return;
     const least_s = 0.5; // at a calf vein or a superficial one; the learner may say otherwise
     this.actions.enter({ place: this.at, reflux: reflux_s > least_s ? "present" : "absent", reflux_s: Math.min(reflux_s, 20) });
-    announce(`Kept in the worksheet: reflux of ${reflux_s.toFixed(2)} seconds`);
+    announce(t("sheet.kept_reflux", { s: shown(reflux_s, 2) }));
   }
 
   /** Fetches the pixels of pictures that are not here yet. */
@@ -240,23 +241,23 @@ export class Worksheet {
 
   private furnish(): void {
     const head = make("div", "sheet-tools");
-    head.append(make("b", "mode", "Worksheet"), make("span", "caption", "Everything is kept as you write it."), make("span", "spring"),
-      button("Read and print", () => this.preview()), button("Close", () => this.open(false)));
+    head.append(make("b", "mode", t("page.worksheet")), make("span", "caption", t("sheet.kept")), make("span", "spring"),
+      button(t("sheet.read"), () => this.preview()), button(t("page.close"), () => this.open(false)));
     this.list.className = "sheet-rows";
     this.ends.className = "sheet-ends";
     this.chips.className = "sheet-chips";
     this.chips.setAttribute("role", "group");
-    this.chips.setAttribute("aria-label", "Conclusion");
+    this.chips.setAttribute("aria-label", t("sheet.conclusion"));
     for (const [value, word] of Object.entries(CONCLUSION_WORDS).filter(([v]) => v)) {
-      const b = button(word.replace(" where examined", ""), () => this.actions.enter({ conclusion: this.sheet?.conclusion === value ? "" : value }));
+      const b = button(value === "no_dvt" ? t("sheet.conclusion.no_dvt.short") : word, () => this.actions.enter({ conclusion: this.sheet?.conclusion === value ? "" : value }));
       b.dataset.value = value;
       this.chips.append(b);
     }
-    Object.assign(this.impression, { rows: 3, maxLength: 600, placeholder: "Impression: what you saw, how far it reaches, what should follow" });
-    this.impression.setAttribute("aria-label", "Impression");
+    Object.assign(this.impression, { rows: 3, maxLength: 600, placeholder: t("sheet.impression.hint") });
+    this.impression.setAttribute("aria-label", t("sheet.impression"));
     this.impression.oninput = () => this.later("impression", () => this.actions.enter({ text: this.impression.value }));
     const foot = make("div", "sheet-foot-box");
-    foot.append(this.ends, make("span", "caption", "Conclusion"), this.chips, this.impression);
+    foot.append(this.ends, make("span", "caption", t("sheet.conclusion")), this.chips, this.impression);
     this.drawer.append(head, this.list, foot);
     // Keys of a text are its own.
     this.drawer.addEventListener("keydown", (e) => (e.target instanceof HTMLTextAreaElement || e.target instanceof HTMLInputElement) && e.key !== "Escape" && e.stopPropagation());
@@ -281,13 +282,13 @@ export class Worksheet {
         this.actions.enter({ [which]: from && to ? [Number(from), Number(to)] : [] });
       };
       const choice = (name: string): HTMLSelectElement => {
-        const s = select(`${name} of the clot`, {}, "", () => {
+        const s = select(name, {}, "", () => {
           if ([...box.querySelectorAll("select")].every((x) => x.value) || !s.value) send();
         });
         s.append(new Option("\u2013", ""), ...Object.entries(own).map(([value, title]) => new Option(title, value)));
         return s;
       };
-      box.append(make("span", "caption", `Clot in ${which} veins from`), choice("Upper end"), make("span", "caption", "to"), choice("Lower end"));
+      box.append(make("span", "caption", t(`sheet.clot_${which}`)), choice(t("sheet.upper_end")), make("span", "caption", t("sheet.to")), choice(t("sheet.lower_end")));
       return box;
     });
     this.ends.replaceChildren(...boxes);
@@ -304,19 +305,19 @@ export class Worksheet {
       b.title = FINDING_WORDS[f.finding];
       return b;
     });
-    const age = select("Age of the clot", AGE_WORDS, "age?", (v) => enter({ age: v }));
-    const kind = select("How it lies in the lumen", KIND_WORDS, "lumen?", (v) => enter({ kind: v }));
-    const reflux = select("Reflux", REFLUX_WORDS, "reflux not looked at", (v) => enter({ reflux: v }));
+    const age = select(t("sheet.age"), AGE_WORDS, t("sheet.age.none"), (v) => enter({ age: v }));
+    const kind = select(t("sheet.kind"), KIND_WORDS, t("sheet.kind.none"), (v) => enter({ kind: v }));
+    const reflux = select(t("sheet.reflux"), REFLUX_WORDS, t("sheet.reflux.none"), (v) => enter({ reflux: v }));
     const seconds = make("input");
     Object.assign(seconds, { placeholder: "s", inputMode: "decimal", maxLength: 5, className: "seconds" });
-    seconds.setAttribute("aria-label", "Duration of reflux, s");
+    seconds.setAttribute("aria-label", t("sheet.reflux_s"));
     seconds.oninput = () => this.later(`s${i}`, () => {
       const value = Number.parseFloat(seconds.value.replace(",", "."));
       enter({ reflux_s: value >= 0 && value <= 20 ? value : null });
     });
     const text = make("input");
-    Object.assign(text, { placeholder: "Note", maxLength: 200, autocomplete: "off" });
-    text.setAttribute("aria-label", `Note on ${p.title}`);
+    Object.assign(text, { placeholder: t("sheet.note"), maxLength: 200, autocomplete: "off" });
+    text.setAttribute("aria-label", t("sheet.note_on", { place: p.title }));
     text.oninput = () => this.later(`t${i}`, () => enter({ text: text.value }));
     found.append(...buttons);
     clot.append(age, kind);
@@ -359,18 +360,18 @@ export class Worksheet {
     const sheet = this.sheet!;
     return (["without", "with"] as const).map((view) => {
       const p = newest(sheet, place, view);
-      if (!p) return make("span", "thumb none", view);
+      if (!p) return make("span", "thumb none", t(`sheet.${view}`));
       const shot = drawPicture(sheet, p, this.source(p));
       const edit = make("span", "edit");
       const swap = button("\u21c4", () => this.actions.enter({ change: p.number, view: view === "with" ? "without" : "with" }));
-      swap.title = `It is a picture ${view === "with" ? "without" : "with"} compression`;
+      swap.title = t(view === "with" ? "sheet.is_without" : "sheet.is_with");
       const drop = button("\u00d7", () => this.actions.enter({ change: p.number, drop: true }));
-      drop.title = "Throw this picture away";
+      drop.title = t("sheet.drop");
       swap.setAttribute("aria-label", swap.title);
       drop.setAttribute("aria-label", drop.title);
       edit.append(swap, drop);
       const box = make("span", "thumb");
-      box.title = `${minutes(p.time_s)}, ${p.force_n.toFixed(1)} N`;
+      box.title = `${minutes(p.time_s)}, ${shown(p.force_n, 1)} N`;
       box.append(shot, ...(this.controls ? [edit] : []));
       return box;
     });
@@ -380,7 +381,7 @@ export class Worksheet {
     const sheet = this.sheet;
     if (!sheet || !this.rows.length) return;
     const here = sheet.places[this.at]!;
-    find("station-name").textContent = `${this.at + 1} of ${sheet.places.length}  ${[sideWord(sheet), here.title].filter(Boolean).join(", ")}`;
+    find("station-name").textContent = t("sheet.station", { n: this.at + 1, of: sheet.places.length, place: [sideWord(sheet), here.title].filter(Boolean).join(", ") });
     find("station-found").textContent = FINDING_WORDS[here.finding];
     find("station-thumbs").replaceChildren(...this.thumbs(this.at));
     for (const id of ["store-picture", "station-before", "station-after"]) find<HTMLButtonElement>(id).disabled = !this.controls;
@@ -416,7 +417,7 @@ export class Worksheet {
       if (document.activeElement !== box) box.value = value;
       box.disabled = !this.controls;
     }
-    if (document.activeElement !== row.seconds) row.seconds.value = typeof p.reflux_s === "number" ? String(p.reflux_s) : "";
+    if (document.activeElement !== row.seconds) row.seconds.value = typeof p.reflux_s === "number" ? decimal(String(p.reflux_s)) : "";
     if (document.activeElement !== row.text) row.text.value = p.text;
     row.text.disabled = row.seconds.disabled = !this.controls;
     const key = `${["without", "with"].map((v) => newest(this.sheet!, i, v as "with")).map((x) => (x ? `${x.number}${x.view}${this.source(x).length}` : "")).join()}${this.controls}`;
@@ -429,8 +430,8 @@ export class Worksheet {
 
   private about(): About {
     const exam = this.exam;
-    return [["Patient", exam?.title], ["Protocol", this.actions.protocol(exam?.protocol ?? "")], ["Examiner", this.actions.learner()],
-      ["Time", exam ? minutes(exam.elapsed_s) : ""], ["Exam", this.sheet?.exam], ["Question", exam?.history]];
+    return [[t("sheet.patient"), exam?.title], [t("start.protocol"), this.actions.protocol(exam?.protocol ?? "")], [t("sheet.examiner"), this.actions.learner()],
+      [t("sheet.time"), exam ? minutes(exam.elapsed_s) : ""], [t("sheet.exam"), this.sheet?.exam], [t("sheet.question"), exam?.history]];
   }
 
   private draw(): HTMLElement {
@@ -440,7 +441,7 @@ export class Worksheet {
   private preview(): void {
     if (!this.sheet) return;
     const row = make("div", "actions");
-    row.append(button("Print, or save as PDF", () => window.print(), "primary"), button("Save as JSON", () => this.save()), make("span", "spring"), button("Close", () => this.dialog.close()));
+    row.append(button(t("sheet.print"), () => window.print(), "primary"), button(t("sheet.json"), () => this.save()), make("span", "spring"), button(t("page.close"), () => this.dialog.close()));
     this.dialog.replaceChildren(make("div", "paper"), row);
     this.painted = "";
     if (!this.dialog.open) this.dialog.showModal();
@@ -467,9 +468,10 @@ export class Worksheet {
     const sheet = this.sheet!;
     const { type: _type, pictures, ...rest } = sheet;
     const about = { sonde_worksheet: 1, trainee: this.actions.learner(), title: this.exam?.title, history: this.exam?.history, protocol: this.actions.protocol(this.exam?.protocol ?? "") };
+    const english = (_key: string, value: unknown): unknown => (typeof value === "string" ? original(value) : value); // programs read it
     const shots = pictures.map((p) => ({ ...p, image: this.source(p).replace(/^data:image\/png;base64,/, "") }));
     const link = make("a");
-    link.href = `data:application/json;charset=utf-8,${encodeURIComponent(JSON.stringify({ ...about, ...rest, pictures: shots }, null, 1))}`;
+    link.href = `data:application/json;charset=utf-8,${encodeURIComponent(JSON.stringify({ ...about, ...rest, pictures: shots }, english, 1))}`;
     link.download = `worksheet-${sheet.exam}.json`;
     link.click();
   }

@@ -2,13 +2,15 @@
 // with every press, the learner's own images, force over time, earlier exams, measures.
 
 import { type Child, h, s } from "./dom";
-import { COLOURS, DECISIONS, type Entry, type Exam, isGood, plural, type Press, pressCount, WORDS } from "./exam_data";
+import { COLOURS, DECISIONS, type Entry, type Exam, isGood, type Press, pressCount, WORDS } from "./exam_data";
 import { drawScores, drawTraces, drawVein, pressMark } from "./exam_drawings";
 import { type Advice, toWorkOn, wentWell } from "./exam_words";
 import { fixed, isKnown, type Real } from "./number";
 import { type Cell, columns, table } from "./table";
 import { drawSheet, type SheetPicture } from "./worksheet";
+import { capital, counted, dress, language, t, translated } from "../words/language";
 
+const GUIDANCE = { full: t("guidance.full"), hints: t("guidance.hints"), exam: t("guidance.exam") };
 const LISTED = 9; // exams in the table of earlier ones
 const SHORT = 24; // a list of presses that stands open
 
@@ -25,22 +27,22 @@ const percent = (share: Real): string => `${inPercent(share)}${isKnown(share) ? 
 function duration(seconds: Real): string {
   if (!isKnown(seconds) || seconds < 0) return fixed(seconds, 0);
   const whole = Math.floor(seconds);
-  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} min`;
+  return `${t("report.minutes", { time: `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}` })}`;
 }
 
 /** 22 November 2026, 04:40 UTC */
 function dateInWords(date: string): string {
-  const months = ["January", "February", "March", "April", "May", "June", "July", "August", "September", "October", "November", "December"];
   const parts = /^(\d{4})-(\d\d)-(\d\d)T(\d\d:\d\d):\d\dZ$/.exec(date);
-  const month = parts ? months[Number(parts[2]) - 1] : undefined;
-  return parts && month ? `${Number(parts[3])} ${month} ${parts[1]}, ${parts[4]} UTC` : date;
+  if (!parts || Number.isNaN(Date.parse(date))) return date;
+  const day = new Intl.DateTimeFormat(language === "en" ? "en-GB" : language, { dateStyle: "long", timeZone: "UTC" }).format(new Date(date));
+  return `${day}, ${parts[4]} UTC`;
 }
 
 /** Segment and centimetres from the groin, or that the vein was not in view. */
 function placeOf(data: Exam, press: Press): string {
-  if (!isKnown(press.along_mm)) return "vein not in view";
+  if (!isKnown(press.along_mm)) return t("report.not_in_view");
   const title = data.vein.segments.find((segment) => segment.id === press.segment)?.title;
-  return `${title ? `${title}, ` : ""}${fixed(press.along_mm / 10, 1)} cm`;
+  return title ? t("report.place", { place: title, cm: fixed(press.along_mm / 10, 1) }) : `${fixed(press.along_mm / 10, 1)} cm`;
 }
 
 function figure(drawing: SVGElement, name: string, title: string, caption: string): HTMLElement {
@@ -57,11 +59,11 @@ function dial(score: number, passed: boolean): SVGElement {
   const ring = { cx: 66, cy: 66, r: 54, fill: "none", "stroke-width": 11 };
   return s(
     "svg",
-    { class: "fig dial", role: "img", "aria-label": `Score: ${fixed(score, 0)} of 100 points`, viewBox: "0 0 132 132", width: 132, height: 132 },
+    { class: "fig dial", role: "img", "aria-label": t("report.score_of", { score: fixed(score, 0) }), viewBox: "0 0 132 132", width: 132, height: 132 },
     s("circle", { ...ring, stroke: "#e4e9ed" }),
     s("circle", { ...ring, stroke: passed ? "#00795a" : "#b3261e", "stroke-dasharray": `${((round * score) / 100).toFixed(1)} ${round.toFixed(1)}`, transform: "rotate(-90 66 66)" }),
     s("text", { x: 66, y: 74, class: "middle", style: "font-size:38px;font-weight:680" }, fixed(score, 0)),
-    s("text", { x: 66, y: 93, class: "middle", style: "font-size:12.5px;fill:#55616b" }, "of 100"),
+    s("text", { x: 66, y: 93, class: "middle", style: "font-size:12.5px;fill:#55616b" }, t("result.of")),
   );
 }
 
@@ -71,32 +73,32 @@ function head(data: Exam): HTMLElement {
     exam.trainee && strong(exam.trainee),
     exam.date && dateInWords(exam.date),
     data.protocol?.title ?? exam.protocol,
-    exam.guidance && `guidance: ${exam.guidance}`,
+    exam.guidance && t("report.guidance", { level: exam.guidance in GUIDANCE ? GUIDANCE[exam.guidance as keyof typeof GUIDANCE] : exam.guidance }),
   ];
   const meta = h("p", { class: "meta" });
   for (const child of about) if (child) meta.append(...(meta.hasChildNodes() ? [" \u00b7 "] : []), child);
-  const summary = score.summary.replace(/^(Passed\. |Not passed: |Not passed\. )/, ""); // the tag says these words already
-  const sentence = summary.charAt(0).toUpperCase() + summary.slice(1);
+  const said = [`${t("result.passed")}. `, `${t("result.not_passed")}: `, `${t("result.not_passed")}. `].find((words) => score.summary.startsWith(words)) ?? "";
+  const sentence = capital(score.summary.slice(said.length)); // the tag says these words already
   return h("header", {}, h("div", { class: "top" },
     h("div", {},
-      h("p", { class: "eyebrow" }, "Compression ultrasound \u00b7 examination report"),
+      h("p", { class: "eyebrow" }, t("report.eyebrow")),
       h("h1", {}, exam.title),
       meta,
-      h("p", { class: "verdict" }, h("span", { class: `tag ${score.passed ? "good" : "bad"}` }, score.passed ? "Passed" : "Not passed"), sentence),
-      data.interrupted && quiet("The exam was interrupted before its end. It is listed among the exams but does not count as one.")),
+      h("p", { class: "verdict" }, h("span", { class: `tag ${score.passed ? "good" : "bad"}` }, score.passed ? t("result.passed") : t("result.not_passed")), sentence),
+      data.interrupted && quiet(t("report.interrupted"))),
     dial(score.score, score.passed)));
 }
 
 function question(data: Exam): HTMLElement {
   const { score, patient, protocol } = data;
   const card = (look: string, title: string, words: string): HTMLElement => h("div", { class: `card ${look}` }, h("h3", {}, title), h("p", {}, words));
-  const answer = score.correct ? "\u2713 Your answer, right" : score.answered ? "\u2717 Your answer, wrong" : "\u2717 No answer";
-  return section("question", "The patient and the answer",
+  const answer = score.correct ? t("report.answer_right") : score.answered ? t("report.answer_wrong") : t("report.answer_none");
+  return section("question", t("report.question"),
     patient.history && h("p", { class: "text" }, patient.history),
-    protocol?.text && quiet(`${protocol.title}: ${protocol.text}`),
+    protocol?.text && quiet(t("report.protocol", { title: protocol.title, text: protocol.text })),
     h("div", { class: "cards" },
-      card(score.correct ? "right" : "wrong", answer, score.diagnosis || "No answer"),
-      card("", "The truth", score.truth || patient.diagnosis || (score.thrombosis ? "Deep vein thrombosis" : "No deep vein thrombosis"))));
+      card(score.correct ? "right" : "wrong", answer, score.diagnosis || t("report.no_answer")),
+      card("", t("result.truth"), score.truth || patient.diagnosis || (score.thrombosis ? t("report.dvt") : t("report.no_dvt")))));
 }
 
 function advice(data: Exam): HTMLElement {
@@ -105,9 +107,9 @@ function advice(data: Exam): HTMLElement {
       ? h("ul", {}, ...items.map(([about, sentence]) => h("li", {}, about && strong(about), about && ": ", sentence)))
       : h("p", {}, none));
   const good = wentWell(data);
-  return section("advice", "What to take away", h("div", { class: "two" },
-    list("What to work on", toWorkOn(data), "Nothing: every answer was right and every press was good."),
-    good.length > 0 && list("What went well", good, "")));
+  return section("advice", t("report.advice"), h("div", { class: "two" },
+    list(t("report.work_on"), toWorkOn(data), t("report.nothing")),
+    good.length > 0 && list(t("report.went_well"), good, "")));
 }
 
 function score(data: Exam): HTMLElement {
@@ -115,14 +117,14 @@ function score(data: Exam): HTMLElement {
   const rows: Cell[][] = data.parts.map((part) => {
     const bar = h("i");
     bar.style.width = `${Math.min(100, Math.max(0, (100 * part.points) / part.of)).toFixed(1)}%`;
-    const lost = part.lost ? h("div", {}, strong(`\u2212${fixed(part.of - part.points, 1)} of ${fixed(part.of, 0)}:`), ` ${part.lost}.`) : "";
-    return [strong(part.title), h("div", {}, part.meaning, lost, h("span", { class: "bar" }, bar)), `${fixed(part.points, 1)} of ${fixed(part.of, 0)}`];
+    const lost = part.lost ? h("div", {}, strong(t("report.lost_of", { points: fixed(part.of - part.points, 1), of: fixed(part.of, 0) })), ` ${part.lost}.`) : "";
+    return [strong(part.title), h("div", {}, part.meaning, lost, h("span", { class: "bar" }, bar)), t("report.n_of", { n: fixed(part.points, 1), of: fixed(part.of, 0) })];
   });
-  const total = `${fixed(data.score.score, 1)} of 100`;
-  return section("score", "The score",
-    table({ columns: columns("<Part", "<What it means, and where points went", "Points"), rows: [...rows.map((cells) => ({ cells })), { cells: ["Score", "", total], strong: true }] }),
+  const total = t("sheet.score_of", { score: fixed(data.score.score, 1) });
+  return section("score", t("report.score"),
+    table({ columns: columns(`<${t("report.part")}`, `<${t("report.part_meaning")}`, t("result.points")), rows: [...rows.map((cells) => ({ cells })), { cells: [t("result.score"), "", total], strong: true }] }),
     sum > data.score.score + 0.05 &&
-      h("p", {}, `The parts add up to ${fixed(sum, 1)} points. A wrong or missing diagnosis is never passed: the score is limited to ${fixed(data.score.score, 1)}.`));
+      h("p", {}, t("report.capped", { sum: fixed(sum, 1), score: fixed(data.score.score, 1) })));
 }
 
 // ---- the vein, the images, the traces
@@ -130,39 +132,36 @@ function score(data: Exam): HTMLElement {
 function along(data: Exam): HTMLElement {
   const hidden = data.presses.filter((p) => !isKnown(p.along_mm)).length;
   const caption =
-    `Above, the vein from the groin to the knee, with what was examined${data.vein.clot ? " and what is there" : ""}. Below, each press by its place and its greatest force. ` +
-    "A green box reaches from the force that closes a healthy vein at a place to the red line, the limit there: above it a press is too hard." +
-    (hidden ? ` ${hidden} press${plural(hidden)} without the vein in view cannot be drawn.` : "");
+    t(data.vein.clot ? "report.along.clot" : "report.along.plain") + (hidden ? ` ${counted("report.hidden", hidden)}` : "");
   const rows = data.segments.map((v, i) => {
     const asked = v.needed || v.decision !== "";
-    const right = !v.decision ? "not decided" : !v.correct ? "wrong" : v.supported ? "right" : "right, but not shown";
-    const cells: Cell[] = [strong(`${i + 1}. ${v.title}`), asked ? DECISIONS[v.decision] : "not part of this protocol", v.truth ? DECISIONS[v.truth] : "\u2013",
-      asked ? verdict(v.correct, right) : "\u2013", `${v.places_done} of ${v.places}`];
+    const right = !v.decision ? t("report.not_decided") : !v.correct ? t("report.wrong") : v.supported ? t("report.right") : t("report.not_shown");
+    const cells: Cell[] = [strong(`${i + 1}. ${v.title}`), asked ? DECISIONS[v.decision] : t("report.not_in_protocol"), v.truth ? DECISIONS[v.truth] : "\u2013",
+      asked ? verdict(v.correct, right) : "\u2013", t("report.n_of", { n: v.places_done, of: v.places })];
     return { cells };
   });
-  return section("vein", "Along the vein",
-    figure(drawVein(data), "vein", "The vein along its length, and every press", caption),
-    h("h3", {}, "Segment by segment"),
-    table({ columns: columns("<Segment", "<Your answer", "<Truth", "<Verdict", "Places pressed well"), rows }),
-    quiet("An answer is shown when a press of the right kind in that segment supports it: one that closed the vein, or one that left it open at the force that closes a healthy vein there."));
+  return section("vein", t("report.along"),
+    figure(drawVein(data), "vein", t("report.vein_figure"), caption),
+    h("h3", {}, t("report.by_segment")),
+    table({ columns: columns(`<${t("result.segment")}`, `<${t("result.said")}`, `<${t("result.truth")}`, `<${t("report.verdict")}`, t("report.places_well")), rows }),
+    quiet(t("report.shown_note")));
 }
 
 function pictures(data: Exam): HTMLElement | null {
   if (!data.presses.length) return null;
-  if (!data.pictures.length) return section("pictures", "Your compressions", h("p", {}, "No images were kept of this exam."));
+  if (!data.pictures.length) return section("pictures", t("report.pictures"), h("p", {}, t("report.no_images")));
   const side = (bytes: string | null, number: number, label: string): HTMLElement =>
-    h("div", {}, bytes ? h("img", { alt: `Ultrasound image of press ${number}, ${label}`, src: `data:image/png;base64,${bytes}` }) : h("em", {}, "no image"), h("span", {}, label));
+    h("div", {}, bytes ? h("img", { alt: t("report.image_of", { n: number, label }), src: `data:image/png;base64,${bytes}` }) : h("em", {}, t("report.no_image")), h("span", {}, label));
   const pairs = data.pictures.map(({ press, before, peak }) => {
     const p = data.presses[press - 1]!;
-    const title = h("b", {}, `Press ${press}: ${WORDS[p.result]}`);
+    const title = h("b", {}, t("report.press_result", { n: press, result: WORDS[p.result] }));
     title.style.color = COLOURS[p.result];
-    const left = isKnown(p.vein) ? `, ${percent(p.vein)} of the vein left` : "";
-    return h("figure", {}, h("div", { class: "images" }, side(before, press, "before"), side(peak, press, "at the peak")),
-      h("figcaption", {}, title, h("br"), placeOf(data, p), h("br"), `${fixed(p.force_peak_n, 1)} N${left}`));
+    const force = fixed(p.force_peak_n, 1);
+    return h("figure", {}, h("div", { class: "images" }, side(before, press, t("report.before")), side(peak, press, t("report.peak"))),
+      h("figcaption", {}, title, h("br"), placeOf(data, p), h("br"), isKnown(p.vein) ? t("report.vein_left", { force, percent: percent(p.vein) }) : `${force} N`));
   });
-  const all = pairs.length < data.presses.length ? "" : "All ";
-  return section("pictures", "Your compressions",
-    quiet(`${all}${pairs.length} of your ${data.presses.length} presses: the image before and at the peak. In a complete press the vein's walls touch. In this simulator the artery beside it gives way too and keeps four to six tenths of its area; in a patient it keeps its shape.`),
+  const all = t(pairs.length < data.presses.length ? "report.pictures_some" : "report.pictures_all", { n: pairs.length, of: data.presses.length });
+  return section("pictures", t("report.pictures"), quiet(`${all} ${t("report.pictures_note")}`),
     h("div", { class: "pictures" }, ...pairs));
 }
 
@@ -171,66 +170,66 @@ function worksheet(data: Exam): HTMLElement | null {
   const sheet = data.worksheet;
   if (!sheet) return null;
   const source = (p: SheetPicture): string => (p.image ? `data:image/png;base64,${p.image}` : "");
-  const print = h("button", { type: "button", class: "save alone" }, "Print the worksheet alone");
+  const print = h("button", { type: "button", class: "save alone" }, t("report.print_alone"));
   print.onclick = () => {
     document.body.classList.add("sheet-alone");
     window.print();
     document.body.classList.remove("sheet-alone");
   };
   const { exam: e, patient, protocol } = data;
-  return section("worksheet", "Your worksheet", h("p", {}, print),
-    drawSheet(sheet, [["Patient", e.title], ["Protocol", protocol?.title ?? e.protocol], ["Examiner", e.trainee], ["Date", e.date && dateInWords(e.date)], ["Exam", e.exam], ["Question", patient.history]], source));
+  return section("worksheet", t("report.worksheet"), h("p", {}, print),
+    drawSheet(sheet, [[t("sheet.patient"), e.title], [t("start.protocol"), protocol?.title ?? e.protocol], [t("sheet.examiner"), e.trainee], [t("sheet.date"), e.date && dateInWords(e.date)], [t("sheet.exam"), e.exam], [t("sheet.question"), patient.history]], source));
 }
 
 const traces = (data: Exam): HTMLElement | null =>
-  data.traces.time_s.length < 2 ? null : section("traces", "Force and vein over time",
-    figure(drawTraces(data), "traces", "Force of the probe and area of the vein over time",
-      "Shaded: presses, in the colours of the vein's drawing. Red: the limit of the place, above which a press is too hard. The blue line is broken where the vein was not in the image."));
+  data.traces.time_s.length < 2 ? null : section("traces", t("report.traces"),
+    figure(drawTraces(data), "traces", t("report.traces_figure"),
+      t("report.traces_note")));
 
 // ---- earlier exams, measures, presses
 
 function earlier(data: Exam): HTMLElement {
-  if (data.exams.length < 2) return section("earlier", "Compared with your earlier exams", h("p", {}, "This is the first exam in your log."));
+  if (data.exams.length < 2) return section("earlier", t("report.earlier"), h("p", {}, t("report.first")));
   const same = data.exams.slice(1).filter((e) => e.same_patient && !e.interrupted);
   const best = Math.max(...same.map((e) => e.score));
   const [before, now] = [data.curve[data.curve.length - 2], data.curve[data.curve.length - 1]];
   const median = before && now && !data.interrupted
-    ? `Exam ${now.number}. The median of your last five is ${fixed(now.median, 0)} points; before this exam it was ${fixed(before.median, 0)}. ` : "";
-  const seen = same.length ? `You have examined this patient ${same.length} time${same.length === 1 ? "" : "s"} before, with ${fixed(best, 0)} points at best.` : "This patient was new to you.";
-  const result = (e: Entry): Cell => (e.interrupted ? "interrupted" : verdict(e.passed, e.passed ? "passed" : e.correct ? "not passed" : "wrong diagnosis"));
+    ? `${t("report.median", { n: now.number, now: fixed(now.median, 0), before: fixed(before.median, 0) })} ` : "";
+  const seen = same.length ? counted("report.seen", same.length, { best: fixed(best, 0) }) : t("report.new");
+  const result = (e: Entry): Cell => (e.interrupted ? t("report.was_interrupted") : verdict(e.passed, e.passed ? t("report.passed") : e.correct ? t("report.not_passed") : t("report.wrong_diagnosis")));
   const rows = data.exams.slice(0, LISTED).map((e, i) => ({
     strong: i === 0,
-    cells: [strong(`${e.title}${i === 0 ? " (this exam)" : ""}`), h("span", { class: "line" }, e.date.slice(0, 16).replace("T", " ")), fixed(e.score, 0), result(e), percent(e.coverage), percent(e.valid_share),
+    cells: [strong(i === 0 ? t("report.this_exam", { title: e.title }) : e.title), h("span", { class: "line" }, e.date.slice(0, 16).replace("T", " ")), fixed(e.score, 0), result(e), percent(e.coverage), percent(e.valid_share),
       withUnit(isKnown(e.time_s) ? e.time_s / 60 : e.time_s, 1, "min")],
   }));
-  return section("earlier", "Compared with your earlier exams",
+  return section("earlier", t("report.earlier"),
     h("p", {}, median + seen),
-    before && figure(drawScores(data), "curve", "Your scores, exam by exam",
-      "Each exam that was finished: filled, passed; hollow, not passed; the outer ring marks this one. The line is the median of the last five."),
-    table({ columns: columns("<Patient", "<Date (UTC)", "Score", "<Result", "Coverage", "Good presses", "Time"), rows }),
-    data.exams.length > LISTED && quiet(`and ${data.exams.length - LISTED} earlier ones.`));
+    before && figure(drawScores(data), "curve", t("report.curve"),
+      t("report.curve_note")),
+    table({ columns: columns(`<${t("sheet.patient")}`, `<${t("report.date")}`, t("result.score"), `<${t("report.result")}`, t("report.coverage"), t("report.good_presses"), t("report.time")), rows }),
+    data.exams.length > LISTED && quiet(t("report.more_earlier", { n: data.exams.length - LISTED })));
 }
 
 function measures(data: Exam): HTMLElement {
   const m = data.metrics;
   const scaled = (value: Real, scale: number): Real => (isKnown(value) ? value * scale : value);
   const rows: [string, string, string][] = [
-    ["Places pressed well", `${m.places_done} of ${m.places}`, "Planned places with a good press within reach."],
-    ["Coverage", percent(m.coverage), "Of the planned vein, near a good press."],
-    ["Coverage of the whole vein", percent(m.vein_coverage), "From the groin to the knee, planned or not."],
-    ["Longest gap", withUnit(scaled(m.largest_gap_mm, 0.1), 1, "cm"), "Longest planned stretch without a good press."],
-    ["Good presses", `${m.complete + m.open} of ${pressCount(data)}`, "Complete, or showing an open vein."],
-    ["Completeness", percent(m.completeness), "How far the complete presses closed the vein, on average."],
-    ["Greatest force", withUnit(m.force_peak_n, 1, "N"), "Over the whole exam."],
-    ["Usual upper force", withUnit(m.force_p95_n, 1, "N"), "95 % of the time of pressing stayed below."],
-    ["Time", duration(m.time_s), "From the first image to the last."],
-    ["Time on the skin", duration(m.contact_s), "With the probe pressing."],
-    ["Path of the probe", withUnit(scaled(m.path_mm, 1e-3), 2, "m"), "Shorter is calmer."],
-    ["Smoothness", fixed(m.smoothness_ldlj, 1), "How evenly the probe moved between presses: nearer to zero is smoother."],
+    [t("report.places_well"), t("report.n_of", { n: m.places_done, of: m.places }), t("report.m.places")],
+    [t("report.coverage"), percent(m.coverage), t("report.m.coverage")],
+    [t("report.vein_coverage"), percent(m.vein_coverage), t("report.m.vein_coverage")],
+    [t("report.gap"), withUnit(scaled(m.largest_gap_mm, 0.1), 1, "cm"), t("report.m.gap")],
+    [t("report.good_presses"), t("report.n_of", { n: m.complete + m.open, of: pressCount(data) }), t("report.m.good")],
+    [t("report.completeness"), percent(m.completeness), t("report.m.completeness")],
+    [t("report.peak_force"), withUnit(m.force_peak_n, 1, "N"), t("report.m.peak_force")],
+    [t("report.usual_force"), withUnit(m.force_p95_n, 1, "N"), t("report.m.usual_force")],
+    [t("report.time"), duration(m.time_s), t("report.m.time")],
+    [t("report.skin_time"), duration(m.contact_s), t("report.m.skin_time")],
+    [t("report.path"), withUnit(scaled(m.path_mm, 1e-3), 2, "m"), t("report.m.path")],
+    [t("report.smoothness"), fixed(m.smoothness_ldlj, 1), t("report.m.smoothness")],
   ];
-  if (m.taken_off) rows.push(["Probe taken off", String(m.taken_off), "Times the probe was led through the leg: it was taken off until it had left the leg."]);
-  return section("measures", "Measures",
-    table({ columns: columns("<Measure", "Value", "<Meaning"), rows: rows.map(([name, value, meaning]) => ({ cells: [strong(name), value, h("span", { class: "quiet" }, meaning)] })) }));
+  if (m.taken_off) rows.push([t("report.taken_off"), String(m.taken_off), t("report.m.taken_off")]);
+  return section("measures", t("report.measures"),
+    table({ columns: columns(`<${t("report.measure")}`, t("report.value"), `<${t("report.meaning")}`), rows: rows.map(([name, value, meaning]) => ({ cells: [strong(name), value, h("span", { class: "quiet" }, meaning)] })) }));
 }
 
 function presses(data: Exam): HTMLElement | null {
@@ -242,31 +241,33 @@ function presses(data: Exam): HTMLElement | null {
       inPercent(p.vein), inPercent(p.artery_least), fixed(p.tilt_deg, 0)];
     return { cells };
   });
-  const list = table({ columns: columns("No", "at (s)", "<Place", "<Result", "force (N)", "vein left (%)", "artery left (%)", "tilt (\u00b0)"), rows });
+  const list = table({ columns: columns(t("report.no"), t("report.at_s"), `<${t("report.place_head")}`, `<${t("report.result")}`, t("report.force_n"), t("report.vein_left_head"), t("report.artery_left_head"), t("report.tilt_head")), rows });
   list.querySelectorAll("tbody tr").forEach((row, i) => row.setAttribute("id", `press-${i + 1}`));
   const good = data.presses.filter((p) => isGood(p.result)).length;
-  return section("presses", "Every press",
-    h("details", { open: count <= SHORT ? "" : undefined }, h("summary", {}, `${count} press${plural(count)}, ${good} of them good, in the order of time`), list));
+  return section("presses", t("report.presses"),
+    h("details", { open: count <= SHORT ? "" : undefined }, h("summary", {}, counted("report.presses_count", count, { good })), list));
 }
 
 function comments(data: Exam): HTMLElement | null {
   if (!data.comments.length) return null;
   const rows = data.comments.map((c) => ({ cells: [duration(c.time_s), c.text, h("span", { class: "quiet" }, c.author)] }));
-  return section("comments", "Comments", table({ columns: columns("<At", "<Comment", "<By"), rows }));
+  return section("comments", t("page.comments"), table({ columns: columns(`<${t("report.at")}`, `<${t("page.comment")}`, `<${t("report.by")}`), rows }));
 }
 
 function foot(data: Exam): HTMLElement {
   const line = (words: string, code: string | null): Child => code && h("p", {}, words, h("code", {}, code));
   return h("footer", {},
-    h("p", {}, `The patient, the images and the forces are synthetic: computed by Sonde ${data.program}. Scores and measures: formulas of version ${data.score.version}, docs/trainer_theory.md.`),
-    line("Exam ", data.exam.exam),
-    line("Its recording plays again with ", data.recording && `sonde replay ${data.recording}`));
+    h("p", {}, t("report.foot", { program: data.program, version: data.score.version })),
+    line(`${t("sheet.exam")} `, data.exam.exam),
+    line(`${t("report.recording")} `, data.recording && `sonde replay ${data.recording}`));
 }
 
 export function exam(report: unknown): void {
-  const data = report as Exam;
+  const data = translated(report as Exam);
+  dress(document);
+  document.title = t("report.title", { title: data.exam.title });
   document.body.classList.add("exam");
-  const sections = [question(data), advice(data), data.patient.note ? section("case", "About this case", h("p", { class: "text" }, data.patient.note)) : null, comments(data),
+  const sections = [question(data), advice(data), data.patient.note ? section("case", t("report.case"), h("p", { class: "text" }, data.patient.note)) : null, comments(data),
     score(data), worksheet(data), along(data), pictures(data), traces(data), earlier(data), measures(data), presses(data)];
   document.body.append(head(data), h("main", {}, ...sections), foot(data));
   if (location.hash === "#worksheet-alone") document.body.classList.add("sheet-alone");

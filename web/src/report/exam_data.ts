@@ -2,6 +2,7 @@
 
 import type { Real } from "./number";
 import type { Sheet } from "./worksheet";
+import { t } from "../words/language";
 
 export type Result = "complete" | "open" | "insufficient" | "too_hard" | "off_axis";
 export type Decision = "" | "compressible" | "clot" | "not_seen";
@@ -92,18 +93,17 @@ export interface Exam {
 // ---- words and marks
 
 export const WORDS: Record<Result, string> = {
-  complete: "complete",
-  open: "vein stays open",
-  insufficient: "not far enough",
-  too_hard: "too hard",
-  off_axis: "off axis",
+  complete: t("report.press.complete"),
+  open: t("report.press.open"),
+  insufficient: t("report.press.insufficient"),
+  too_hard: t("report.press.too_hard"),
+  off_axis: t("report.press.off_axis"),
 };
 /** Of Okabe and Ito's palette, darkened until text in it is readable; shapes say the same. */
 export const COLOURS: Record<Result, string> = { complete: "#00795a", open: "#0072b2", insufficient: "#946000", too_hard: "#c2410c", off_axis: "#8a4b78" };
 export const RESULTS = Object.keys(WORDS) as Result[];
 
-export const DECISIONS: Record<Decision, string> = { "": "not decided", compressible: "compressible", clot: "clot", not_seen: "not seen" };
+export const DECISIONS: Record<Decision, string> = { "": t("report.not_decided"), compressible: t("report.decision.compressible"), clot: t("report.decision.clot"), not_seen: t("report.decision.not_seen") };
 
 export const isGood = (result: Result): boolean => result === "complete" || result === "open";
-export const plural = (count: number): string => (count === 1 ? "" : "es");
 export const pressCount = (data: Exam): number => RESULTS.reduce((sum, result) => sum + data.metrics[result], 0);

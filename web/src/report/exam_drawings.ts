@@ -5,6 +5,7 @@ import { Chart, drawing, text, textWidth } from "./chart";
 import { s } from "./dom";
 import { COLOURS, type Exam, type Press, RESULTS, type Result, WORDS } from "./exam_data";
 import { fixed, isKnown, real } from "./number";
+import { t } from "../words/language";
 
 const WIDTH = 900;
 const LEFT = 58;
@@ -26,7 +27,7 @@ export function pressMark(x: number, y: number, result: Result): SVGElement {
   return s("path", { d: `M${x.toFixed(1)} ${y.toFixed(1)}${SHAPES[result]}`, fill: filled ? colour : "#fff", stroke: filled ? "#fff" : colour, "stroke-width": filled ? 0.8 : 1.8 });
 }
 
-const inWords = (p: Press, number: number): SVGElement => s("title", {}, `Press ${number}: ${WORDS[p.result]}, ${fixed(p.force_peak_n, 1)} N`);
+const inWords = (p: Press, number: number): SVGElement => s("title", {}, t("report.draw.press", { n: number, result: WORDS[p.result], force: fixed(p.force_peak_n, 1) }));
 
 // ---- the vein
 
@@ -44,13 +45,13 @@ function legend(into: SVGElement, y: number, clot: boolean): void {
   }
   x = LEFT;
   y += 20;
-  const keys: [string, string][] = [[COVERED, "examined"], [MISSED, "planned, not examined"], [UNPLANNED, "not planned"]];
-  if (clot) keys.push([CLOT, "clot"]);
+  const keys: [string, string][] = [[COVERED, t("report.draw.examined")], [MISSED, t("report.draw.missed")], [UNPLANNED, t("report.draw.unplanned")]];
+  if (clot) keys.push([CLOT, t("report.draw.clot")]);
   for (const [fill, words] of keys) {
     into.append(s("rect", { x, y: y - 9, width: 18, height: 10, fill, stroke: "#8b97a1", "stroke-width": 0.6 }), text(x + 24, y, "tick", words));
     x += 24 + textWidth(words) + 20;
   }
-  into.append(place(x + 6, y - 4, true), place(x + 18, y - 4, false), text(x + 28, y, "tick", "planned place, pressed well / not"));
+  into.append(place(x + 6, y - 4, true), place(x + 18, y - 4, false), text(x + 28, y, "tick", t("report.draw.place")));
 }
 
 const place = (cx: number, cy: number, done: boolean): SVGElement => s("circle", { cx, cy, r: 4, fill: done ? "#1b2126" : "#fff", stroke: "#1b2126", "stroke-width": 1.4 });
@@ -70,10 +71,10 @@ export function drawVein(data: Exam): SVGSVGElement {
   if (vein.clot) {
     const [from, to] = vein.clot.map(x) as [number, number];
     svg.append(s("rect", { x: from, y: top + 6, width: to - from, height: height - 12, rx: 5, fill: CLOT }));
-    if (to - from > 40) svg.append(text((from + to) / 2, top + 17, "middle light small", "CLOT"));
+    if (to - from > 40) svg.append(text((from + to) / 2, top + 17, "middle light small", t("report.draw.clot_mark")));
   }
   svg.append(s("rect", { x: x(0), y: top, width: x(vein.length_mm) - x(0), height, fill: "none", stroke: "#5b6670", "stroke-width": 1.2 }));
-  svg.append(text(LEFT - 8, top + 17, "end", "groin"), text(WIDTH - RIGHT, top - 6, "end", "knee"));
+  svg.append(text(LEFT - 8, top + 17, "end", t("report.draw.groin")), text(WIDTH - RIGHT, top - 6, "end", t("report.draw.knee")));
   vein.segments.forEach((segment, i) => {
     const [from, to] = segment.mm.map(x) as [number, number];
     const full = `${i + 1}  ${segment.title}`;
@@ -88,7 +89,7 @@ export function drawVein(data: Exam): SVGSVGElement {
   }
   if (vein.gap && vein.gap[1] - vein.gap[0] >= 5) {
     const [from, to] = vein.gap.map(x) as [number, number];
-    const words = `longest gap ${fixed((vein.gap[1] - vein.gap[0]) / 10, 1)} cm`;
+    const words = t("report.draw.gap", { cm: fixed((vein.gap[1] - vein.gap[0]) / 10, 1) });
     const half = textWidth(words, 12) / 2;
     const y = bottom + 26;
     svg.append(s("path", { d: `M${from} ${y}H${to}M${from} ${y - 4}v8M${to} ${y - 4}v8`, stroke: LIMIT, "stroke-width": 1.4 }));
@@ -100,8 +101,8 @@ export function drawVein(data: Exam): SVGSVGElement {
   const [, most] = range(forces, 0);
   const chart = new Chart(svg, {
     left: LEFT, top: plotTop, width: WIDTH - LEFT - RIGHT, height: plotHeight,
-    x: tightAxis("centimetres along the vein, from the groin to the knee", 0, vein.length_mm / 10, 10),
-    y: axis("force (N)", 0, most || 10, 5),
+    x: tightAxis(t("report.draw.along"), 0, vein.length_mm / 10, 10),
+    y: axis(t("report.force_n"), 0, most || 10, 5),
   });
   for (const p of data.places) {
     const [from, to] = [(p.along_mm - vein.reach_mm) / 10, (p.along_mm + vein.reach_mm) / 10];
@@ -133,8 +134,8 @@ export function drawTraces(data: Exam): SVGSVGElement {
   const areas = data.traces.vein.map((v) => 100 * real(v));
   const [, most] = range([...forces, ...data.places.map((p) => 1.1 * real(p.limit_n))], 1);
   const [, widest] = range(areas, 100);
-  const force = new Chart(svg, { ...across, top: 26, height: 130, title: "Force", x: time(""), y: axis("N", 0, most, 4) });
-  const vein = new Chart(svg, { ...across, top: 216, height: 100, title: "Area of the vein", x: time(unit === 60 ? "minutes" : "seconds"), y: axis("% of rest", 0, widest, 5) });
+  const force = new Chart(svg, { ...across, top: 26, height: 130, title: t("report.draw.force"), x: time(""), y: axis("N", 0, most, 4) });
+  const vein = new Chart(svg, { ...across, top: 216, height: 100, title: t("report.draw.area"), x: time(unit === 60 ? t("report.draw.minutes") : t("report.draw.seconds")), y: axis(t("report.draw.of_rest"), 0, widest, 5) });
   const at = times.map((t) => t / unit);
   data.presses.forEach((p) => {
     const span: [number, number] = [p.start_s / unit, p.end_s / unit];
@@ -153,15 +154,15 @@ export function drawScores(data: Exam): SVGSVGElement {
   const numbers = shown.map((p) => p.number);
   const svg = drawing(WIDTH, 190);
   const [first, last] = [numbers[0]!, numbers[numbers.length - 1]!];
-  const x = tightAxis("exam", first - 0.5, last + 0.5, 12);
+  const x = tightAxis(t("report.draw.exam"), first - 0.5, last + 0.5, 12);
   if (shown.length <= 20) [x.step, x.ticks] = [1, numbers];
-  const chart = new Chart(svg, { left: LEFT, top: 14, width: WIDTH - LEFT - RIGHT, height: 130, x, y: axis("score", 0, 100, 5) });
+  const chart = new Chart(svg, { left: LEFT, top: 14, width: WIDTH - LEFT - RIGHT, height: 130, x, y: axis(t("report.draw.score"), 0, 100, 5) });
   chart.line(numbers, shown.map((p) => p.median), { colour: "#0b5cad", opacity: 0.55 });
   for (const p of shown) {
     const now = p.number === last && !data.interrupted;
     const [cx, cy] = [chart.x(p.number), chart.y(p.score)];
     const colour = p.passed ? "#00795a" : "#b3261e";
-    svg.append(s("circle", { cx, cy, r: now ? 6 : 4, fill: p.passed ? colour : "#fff", stroke: colour, "stroke-width": 1.8 }, s("title", {}, `Exam ${p.number}: ${fixed(p.score, 0)} points`)));
+    svg.append(s("circle", { cx, cy, r: now ? 6 : 4, fill: p.passed ? colour : "#fff", stroke: colour, "stroke-width": 1.8 }, s("title", {}, t("report.draw.exam_points", { n: p.number, score: fixed(p.score, 0) }))));
     if (now) svg.append(s("circle", { cx, cy, r: 10, fill: "none", stroke: "#1b2126", "stroke-width": 1.2 }));
   }
   return svg;

@@ -1,4 +1,7 @@
-// Numbers as a reader expects them: rounded, with a true minus sign, never by the browser's locale.
+// Numbers as a reader expects them: rounded, with a true minus sign; the decimal sign is the language's, but a point in
+// reports that are in English whoever reads them.
+
+import { decimal } from "../words/language";
 
 const MINUS = "\u2212";
 const NONE = "\u2013"; // what is not known
@@ -11,10 +14,14 @@ export const isKnown = (x: Real): x is number => typeof x === "number" && Number
 /** NaN for what is not known, so that it can be computed with. */
 export const real = (x: Real): number => (isKnown(x) ? x : NaN);
 
+let sign = decimal;
+/** From now on decimal points, as in English. */
+export const inEnglish = (): void => void (sign = (digits) => digits);
+
 export function fixed(x: Real, decimals: number): string {
   if (!isKnown(x)) return NONE;
   if (Math.abs(x) >= 1e15) return significant(x, 6);
-  const digits = Math.abs(x).toFixed(decimals);
+  const digits = sign(Math.abs(x).toFixed(decimals));
   return x < 0 && /[1-9]/.test(digits) ? MINUS + digits : digits;
 }
 
