@@ -144,3 +144,13 @@ double app_quantile(double *list, size_t count, double share) {
   qsort(list, count, sizeof *list, by_value);
   return list[(size_t)(share * (double)(count - 1) + 0.5)];
 }
+
+void app_data_home(const char *given, const char *name, char *path, size_t size) {
+  const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
+  if (given)
+    snprintf(path, size, "%s", given);
+  else if (data && data[0])
+    snprintf(path, size, "%s/sonde/%s", data, name);
+  else
+    snprintf(path, size, "%s/.local/share/sonde/%s", home && home[0] ? home : "/tmp", name);
+}

@@ -55,6 +55,10 @@ double app_seconds(clockid_t clock);
 // when it is empty.
 double app_quantile(double *list, size_t count, double share);
 
+// Directory in which the user's data of that name are kept: the given one, else sonde/NAME in
+// $XDG_DATA_HOME or ~/.local/share.
+void app_data_home(const char *given, const char *name, char *path, size_t size);
+
 // Directory of data that ships (cases, protocols), found as the bundled model is; false when there
 // is none.
 bool app_data_directory(const char *name, char *path, size_t size);

@@ -30,20 +30,23 @@ double class_now_s(void) {
 // the tokens go by the environment, which no other user can read, not by the command line.
 static int spawn(const class_room *room, class_learner *learner, int errors) {
   assert(learner->port != 0 && learner->name[0] && errors >= 0);
-  static const char *const OURS[] = {"SONDE_TRAINEE=", "SONDE_PAGE_TOKEN=", "SONDE_TEACHER_TOKEN="};
-  char port[8], own[3][CLASS_NAME + SONDE_PAGE_TOKEN + 24];
+  static const char *const OURS[] = {
+      "SONDE_TRAINEE=", "SONDE_PAGE_TOKEN=", "SONDE_TEACHER_TOKEN=", "SONDE_WATCHER_TOKEN="};
+  enum { OWN = sizeof OURS / sizeof OURS[0] };
+  char port[8], own[OWN][CLASS_NAME + SONDE_PAGE_TOKEN + 24];
   const char *words[ARGUMENTS] = {room->program, "run", "--port", port};
-  const char *variables[VARIABLES] = {own[0], own[1], own[2]};
-  int count = 4, variable = 3;
+  const char *variables[VARIABLES] = {own[0], own[1], own[2], own[3]};
+  int count = 4, variable = OWN;
   snprintf(port, sizeof port, "%u", (unsigned)learner->port);
   snprintf(own[0], sizeof own[0], "%s%s", OURS[0], learner->name);
   snprintf(own[1], sizeof own[1], "%s%s", OURS[1], learner->token);
   snprintf(own[2], sizeof own[2], "%s%s", OURS[2], learner->teacher_token);
+  snprintf(own[3], sizeof own[3], "%s%s", OURS[3], learner->watcher_token);
   if (room->argument_count > ARGUMENTS - 5) return E2BIG;
   for (int i = 0; i < room->argument_count; ++i) words[count++] = room->arguments[i];
   for (char **p = environ; *p && variable < VARIABLES - 1; ++p) {
     bool ours = false;
-    for (int i = 0; i < 3; ++i) ours |= strncmp(*p, OURS[i], strlen(OURS[i])) == 0;
+    for (int i = 0; i < OWN; ++i) ours |= strncmp(*p, OURS[i], strlen(OURS[i])) == 0;
     if (!ours) variables[variable++] = *p;
   }
   const app_program_start what = {.words = words,
@@ -140,12 +143,20 @@ bool class_watch(class_room *room, class_say say) {
       }
     } else if (learner->process) {
       hear(learner);
-    } else if (!learner->gave_up && class_now_s() >= learner->start_again_s && !app_interrupted()) {
+    } else if (learner->taken && !learner->gave_up && class_now_s() >= learner->start_again_s &&
+               !app_interrupted()) {
       class_start(room, learner, say);
     }
     lost += learner->gave_up;
   }
   return lost < room->count;
+}
+
+const char *class_state(const class_learner *learner) {
+  if (learner->gave_up) return "given up";
+  if (!learner->process) return "ended";
+  if (!learner->status.answers) return "starting";
+  return learner->status.phase[0] ? learner->status.phase : "running";
 }
 
 // ---- stopping

@@ -6,7 +6,7 @@
 
 #include <sys/types.h>
 
-enum { CLASS_LEARNERS = 16, CLASS_NAME = 48, CLASS_RESTARTS = 3, CLASS_ANSWER = 4096 };
+enum { CLASS_LEARNERS = 32, CLASS_NAME = 48, CLASS_RESTARTS = 3, CLASS_ANSWER = 4096 };
 
 // What a learner's program says about itself.
 typedef struct class_status {
@@ -18,8 +18,10 @@ typedef struct class_status {
 typedef struct class_learner {
   char name[CLASS_NAME];
   uint16_t port;
+  bool taken; // false: nobody has come for this place, and no program runs
   char token[SONDE_PAGE_TOKEN], teacher_token[SONDE_PAGE_TOKEN]; // of its page
-  pid_t process;                                                 // 0: not running
+  char watcher_token[SONDE_PAGE_TOKEN];
+  pid_t process; // 0: not running
   double started_s, start_again_s;
   uint32_t restarts; // since it last ran for long
   bool gave_up;
@@ -44,6 +46,8 @@ double class_now_s(void);
 bool class_start(const class_room *room, class_learner *learner, class_say say);
 // Notices programs that ended and starts them again, a few times. False when all have given up.
 bool class_watch(class_room *room, class_say say);
+// What a table shows of it: one word.
+const char *class_state(const class_learner *learner);
 // Asks every running program for /status.json; takes at most half a second.
 void class_ask(class_room *room);
 // Ends all programs: asked first, after five seconds killed.

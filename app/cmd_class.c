@@ -1,5 +1,5 @@
 // sonde class: several learners on one machine, one process each, and a table for the teacher.
-#include "class_learners.h"
+#include "class_door.h"
 #include "options.h"
 #include "start.h"
 
@@ -14,7 +14,7 @@ static const char VERB[] = "class";
 
 typedef struct options {
   long learners, port;
-  const char *names, *program;
+  const char *names, *program, *listen, *data;
   char **arguments;
 } options;
 
@@ -26,7 +26,16 @@ static const app_option TABLE[] = {
                 "how many; default: as many as names"),
     OPT_TEXT(names, "names", "A,B,C", "what to call them; default: Learner 1, Learner 2, ..."),
     OPT_INTEGER(port, "port", "P", 1, 65535, "page of the first learner, the others follow"),
-    OPT_TEXT(program, "program", "FILE", NULL), OPT_REST(arguments)};
+    OPT_GROUP("Network"),
+    OPT_TEXT(
+        listen, "listen", "ADDRESS:PORT",
+        "open the class to the network on this address of the computer (0.0.0.0: all), with TLS: "
+        "who knows the code joins by a browser; port 0: any free port"),
+    OPT_TEXT(data, "data", "DIR",
+             "where the certificate and the teacher's secret are kept; default: sonde/class in "
+             "$XDG_DATA_HOME or ~/.local/share"),
+    OPT_TEXT(program, "program", "FILE", NULL),
+    OPT_REST(arguments)};
 
 static int parse_names(const options *s, class_room *room) {
   const char *p = s->names;
@@ -60,6 +69,7 @@ static int check_names(const options *s, class_room *room) {
       if (strcmp(room->learner[k].name, learner->name) == 0)
         return app_usage_error(VERB, "two learners are called '%s'", learner->name);
     learner->port = (uint16_t)(s->port + i);
+    learner->taken = !s->listen || s->names; // else who joins gives it a name
   }
   if (s->port + room->count - 1 > 65535)
     return app_usage_error(VERB, "--port %ld leaves no room for %u learners", s->port, room->count);
@@ -103,13 +113,6 @@ static void say(const class_learner *learner, const char *sentence) {
   fflush(stdout);
 }
 
-static const char *state_of(const class_learner *learner) {
-  if (learner->gave_up) return "given up";
-  if (!learner->process) return "ended";
-  if (!learner->status.answers) return "starting";
-  return learner->status.phase[0] ? learner->status.phase : "running";
-}
-
 static void numbers_of(const class_status *status, char elapsed[16], char score[16]) {
   snprintf(elapsed, 16, "-");
   snprintf(score, 16, "-");
@@ -141,16 +144,19 @@ static void draw_row(const char *name, const char *port, const char *state, cons
 static void draw(const class_room *room) {
   assert(room->count >= 1 && room->count <= CLASS_LEARNERS);
   wipe();
+  uint32_t lines = 1;
   draw_row("learner", "port", "state", "case", "time", "score");
   for (uint32_t i = 0; i < room->count; ++i) {
     const class_learner *learner = &room->learner[i];
+    if (!learner->taken) continue;
     char port[8], elapsed[16], score[16];
     snprintf(port, sizeof port, "%u", (unsigned)learner->port);
     numbers_of(&learner->status, elapsed, score);
-    draw_row(learner->name, port, state_of(learner),
+    draw_row(learner->name, port, class_state(learner),
              learner->status.patient[0] ? learner->status.patient : "-", elapsed, score);
+    ++lines;
   }
-  screen.lines = screen.terminal ? room->count + 1 : 0;
+  screen.lines = screen.terminal ? lines : 0;
   fflush(stdout);
 }
 
@@ -161,11 +167,67 @@ static void print_address(const char *whose, uint16_t port, const char *token) {
   printf("%s: http://127.0.0.1:%u/#%s\n", whose, (unsigned)port, token);
 }
 
+// Makes the secrets of all learners and starts their programs; a learner keeps the secret when the
+// program is started again, and so the page finds it.
+static int begin(const options *s, class_room *room, class_door **door) {
+  sonde_error error = {0};
+  for (uint32_t i = 0; i < room->count; ++i)
+    if (sonde_page_token_make(room->learner[i].token, &error) ||
+        sonde_page_token_make(room->learner[i].teacher_token, &error) ||
+        sonde_page_token_make(room->learner[i].watcher_token, &error))
+      return app_fail(VERB, &error);
+  if (s->listen) {
+    char data[4096], address[64];
+    const char *colon = strrchr(s->listen, ':');
+    long port = 0;
+    if (!colon || (size_t)(colon - s->listen) >= sizeof address)
+      return app_usage_error(VERB, "--listen expects ADDRESS:PORT, got '%s'", s->listen);
+    if (!app_parse_integer(VERB, "listen", colon + 1, 0, 65535, &port)) return APP_BAD_INPUT;
+    snprintf(address, sizeof address, "%.*s", (int)(colon - s->listen), s->listen);
+    app_data_home(s->data, "class", data, sizeof data);
+    class_door_def def = {address, (uint16_t)port, data, s->names != NULL};
+    int code = class_door_open(&def, room, door);
+    if (code != APP_OK) return code;
+  }
+  for (uint32_t i = 0; i < room->count; ++i)
+    if (room->learner[i].taken) class_start(room, &room->learner[i], say);
+  printf("%u learners. A teacher's address is to watch, comment and take control. Ctrl-C ends "
+         "them all.\n",
+         room->count);
+  for (uint32_t i = 0; i < room->count; ++i)
+    if (room->learner[i].taken)
+      print_address(room->learner[i].name, room->learner[i].port, room->learner[i].token);
+  for (uint32_t i = 0; i < room->count; ++i) {
+    char whose[CLASS_NAME + 16];
+    snprintf(whose, sizeof whose, "Teacher of %s", room->learner[i].name);
+    if (room->learner[i].taken)
+      print_address(whose, room->learner[i].port, room->learner[i].teacher_token);
+  }
+  return APP_OK;
+}
+
+// In a pipe: a line for what has changed.
+static void tell_changes(const class_room *room, char told[CLASS_LEARNERS][128]) {
+  for (uint32_t i = 0; i < room->count; ++i) {
+    const class_learner *learner = &room->learner[i];
+    char line[128], elapsed[16], score[16];
+    if (!learner->taken) continue;
+    numbers_of(&learner->status, elapsed, score);
+    snprintf(line, sizeof line, "%s, case %.60s, score %s", class_state(learner),
+             learner->status.patient[0] ? learner->status.patient : "-", score);
+    if (strcmp(line, told[i]) == 0) continue;
+    memcpy(told[i], line, sizeof line);
+    say(learner, line);
+  }
+}
+
 static int run(void *from) {
   const options *s = from;
   static class_room room;
+  static char told[CLASS_LEARNERS][128];
   char program[4096];
   char *none[] = {NULL};
+  class_door *door = NULL;
   room.arguments = s->arguments ? s->arguments : none;
   while (room.arguments[room.argument_count]) room.argument_count++;
   int code = parse_names(s, &room);
@@ -178,53 +240,31 @@ static int run(void *from) {
     return APP_FAILED;
   }
   room.program = s->program ? s->program : program;
-  static char told[CLASS_LEARNERS][128];
   double ask_s = 0;
   bool alive = true;
   app_catch_interrupt();
   screen.terminal = isatty(STDOUT_FILENO) == 1;
-  // A learner keeps the token when the program is started again, and so the page finds it.
-  for (uint32_t i = 0; i < room.count; ++i) {
-    sonde_error error = {0};
-    if (sonde_page_token_make(room.learner[i].token, &error) ||
-        sonde_page_token_make(room.learner[i].teacher_token, &error))
-      return app_fail(VERB, &error);
-  }
-  for (uint32_t i = 0; i < room.count; ++i) class_start(&room, &room.learner[i], say);
-  printf("%u learners. A teacher's address is to watch, comment and take control. Ctrl-C ends "
-         "them all.\n",
-         room.count);
-  for (uint32_t i = 0; i < room.count; ++i)
-    print_address(room.learner[i].name, room.learner[i].port, room.learner[i].token);
-  for (uint32_t i = 0; i < room.count; ++i) {
-    char whose[CLASS_NAME + 16];
-    snprintf(whose, sizeof whose, "Teacher of %s", room.learner[i].name);
-    print_address(whose, room.learner[i].port, room.learner[i].teacher_token);
-  }
+  code = begin(s, &room, &door);
+  if (code != APP_OK) return code;
   draw(&room);
   while (!app_interrupted() && alive) {
     alive = class_watch(&room, say);
+    if (door) class_door_turn(door, &room, say);
     for (uint32_t i = 0; i < room.count; ++i) // that it is back will be news
       if (!room.learner[i].process && !room.learner[i].gave_up) told[i][0] = 0;
     if (class_now_s() >= ask_s) {
       class_ask(&room);
       ask_s = class_now_s() + 1;
-      if (screen.terminal) draw(&room);
-      for (uint32_t i = 0; !screen.terminal && i < room.count; ++i) {
-        const class_learner *learner = &room.learner[i];
-        char line[128], elapsed[16], score[16];
-        numbers_of(&learner->status, elapsed, score);
-        snprintf(line, sizeof line, "%s, case %.60s, score %s", state_of(learner),
-                 learner->status.patient[0] ? learner->status.patient : "-", score);
-        if (strcmp(line, told[i]) == 0) continue;
-        memcpy(told[i], line, sizeof line);
-        say(learner, line);
-      }
+      if (screen.terminal)
+        draw(&room);
+      else
+        tell_changes(&room, told);
     }
     if (screen.terminal && !screen.lines) draw(&room); // something was said
     nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
   }
   class_stop(&room);
+  class_door_close(door);
   if (!alive) fprintf(stderr, "sonde class: no learner's program keeps running\n");
   return alive ? APP_OK : APP_FAILED;
 }
@@ -232,7 +272,7 @@ static int run(void *from) {
 const app_command cmd_class = {
     .verb = "class",
     .summary = "run several learners on one machine",
-    .usage = "--learners N [--names A,B,C] [--port P] [-- RUN OPTIONS]",
+    .usage = "--learners N [--names A,B,C] [--port P] [--listen ADDRESS:PORT] [-- RUN OPTIONS]",
     .text =
         "Starts sonde-run(1) once for each of N learners, each with a page of its own on "
         "127.0.0.1, and shows in a table how they are doing: phase of the exam, case, time, "
@@ -240,7 +280,11 @@ const app_command cmd_class = {
         "second, three times at most; the count starts anew after a minute of running. Each "
         "learner has two addresses, printed at the start: the learner's own, and the teacher's, "
         "to watch, comment, take control and give it back. An address has a secret: who has it "
-        "can take part. Ctrl-C ends them all.",
+        "can take part. Ctrl-C ends them all. With --listen learners come by the network: one port "
+        "with "
+        "TLS, a code printed at the start for who joins by a browser, and an address with a secret "
+        "for the teacher's board. Who joins gets a place, for whom a program is then started; with "
+        "--names only who is on that list gets one.",
     .tail = "Everything after a double hyphen goes to every sonde-run(1), but for the options that "
             "would make the learners meet in one place: a port, a recording, a run without page.",
     OPT_TABLE(TABLE),

@@ -209,13 +209,7 @@ static sonde_status run_exams(const options *s, const sonde_model *model,
   char exams[4096];
   exam_library library = exam_library_find(s->cases, s->protocols);
   const char *named = getenv("SONDE_TRAINEE"), *trainee = s->trainee ? s->trainee : named;
-  const char *data = getenv("XDG_DATA_HOME"), *home = getenv("HOME");
-  if (s->exams)
-    snprintf(exams, sizeof exams, "%s", s->exams);
-  else if (data && data[0])
-    snprintf(exams, sizeof exams, "%s/sonde/exams", data);
-  else
-    snprintf(exams, sizeof exams, "%s/.local/share/sonde/exams", home && home[0] ? home : "/tmp");
+  app_data_home(s->exams, "exams", exams, sizeof exams);
   exam_app_def def = {.model = model,
                       .model_path = session_def->model_path,
                       .bundled_path = library.has_bundled ? library.bundled : NULL,

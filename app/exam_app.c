@@ -267,6 +267,7 @@ sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_erro
       sonde_page_def page = {.port = app->def.port,
                              .token = token,
                              .teacher_token = teacher,
+                             .watcher_token = getenv("SONDE_WATCHER_TOKEN"),
                              .model_path = app->def.model_path,
                              .force_limit_n = app->def.force_limit_n,
                              .exams_directory = app->exams,

@@ -11,5 +11,10 @@
 // written
 sonde_status page_token_find(const char *directory, const char *name, const char *variable,
                              char token[SONDE_PAGE_TOKEN], sonde_error *error);
+// Private key and certificate of a class in directory/name, a file that only its owner can read;
+// new ones are written there when it is missing.
+// @return IO: the file holds something else, can be read by others, or cannot be written
+sonde_status page_identity_find(const char *directory, const char *name,
+                                char pem[SONDE_DOOR_IDENTITY], sonde_error *error);
 
 #endif

@@ -26,6 +26,7 @@ build_packages() {
   need_library libjpeg libjpeg-dev
   need_library sqlite3 libsqlite3-dev
   need_library libmd libmd-dev # SHA-1 and SHA-256
+  need_library openssl libssl-dev # TLS of a class
   need_library yaml-0.1 libyaml-dev
   need_library - libnifti2-dev # no pkg-config file
   need_library zlib zlib1g-dev

@@ -38,7 +38,7 @@ sonde_pc(sonde-limb OF sonde-files sonde)
 sonde_pc(sonde-sweep OF sonde OTHERS zlib)
 sonde_pc(sonde-scene OF sonde-files sonde)
 sonde_pc(sonde-fit OF sonde-solid sonde-files sonde)
-sonde_pc(sonde-exam OF sonde-fit sonde-solid sonde-limb sonde-sweep sonde-files sonde OTHERS sqlite3 libmd zlib)
+sonde_pc(sonde-exam OF sonde-fit sonde-solid sonde-limb sonde-sweep sonde-files sonde OTHERS sqlite3 libmd openssl zlib)
 
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/thigh ${PROJECT_SOURCE_DIR}/data/scenes

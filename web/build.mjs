@@ -37,6 +37,8 @@ await writeFile(script, `${await readFile(script, "utf8")}\n${await licences(pag
 const plotStyle = `/*! uPlot\n${await read("node_modules/uplot/LICENSE")}*/\n${await read("node_modules/uplot/dist/uPlot.min.css")}`;
 await writeFile(path.join(out, "style.css"), `${await read("src/palette.css")}\n${await read("style.css")}\n${await read("src/report/worksheet.css")}\n${plotStyle}`);
 await writeFile(path.join(out, "index.html"), await read("index.html"));
+await bundle("class.ts", "class.js");
+for (const name of ["class.html", "class.css"]) await writeFile(path.join(out, name), await read(name));
 
 // A report is one file: template, style and script. The marks of title and data stay for the program.
 const report = await bundle("report/main.ts", "report.js");
@@ -51,7 +53,7 @@ for (const mark of ["@SONDE_TITLE@", "@SONDE_DATA@"])
   if (template.split(mark).length !== 2) throw new Error(`report.html must hold ${mark} once`);
 await writeFile(path.join(out, "report.html"), template);
 
-for (const name of ["index.html", "style.css", "app.js", "report.html"]) {
+for (const name of ["index.html", "style.css", "app.js", "class.html", "class.css", "class.js", "report.html"]) {
   const file = path.join(out, name);
   await writeFile(`${file}.gz`, gzipSync(await readFile(file), { level: 9 }));
 }

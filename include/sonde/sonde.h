@@ -66,6 +66,7 @@
 #include "sonde/trainer_report.h"
 #include "sonde/dataset.h"
 #include "sonde/stream.h"
+#include "sonde/stream_door.h"
 #include "sonde/stream_igtl.h"
 
 #endif

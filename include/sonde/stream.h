@@ -73,6 +73,7 @@ typedef struct sonde_page_def {
   uint16_t port;               /**< 0: any free port */
   const char *token;           /**< secret of the learner's address; NULL: a new one */
   const char *teacher_token;   /**< of the teacher's address; NULL: a new one */
+  const char *watcher_token;   /**< of who may only watch; NULL: nobody may */
   const char *data_directory;  /**< serve the page from here instead of memory (development) */
   const char *model_path;      /**< for recordings and titles; may be NULL */
   double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */

@@ -1,17 +1,21 @@
 #!/usr/bin/env bash
 # sonde class: starts a program per learner, shows how they are doing, starts one again that died,
-# gives up on one that cannot run, and leaves no program behind.
-source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+# gives up on one that cannot run, and leaves no program behind. With --listen: a port of the network
+# that lets in who knows the code, and nobody else.
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+source "$here/common.sh"
 set -m # a background job keeps its interrupt
 
 rejects 'expected --learners N or --names' class
-rejects 'from 1 to 16' class --learners 17
+rejects "from 1 to 32" class --learners 33
 rejects '3 names' class --learners 2 --names A,B,C
 rejects "two learners are called 'A'" class --names A,B,A
 rejects 'names of 1 to' class --names A,,B
 rejects 'leaves no room' class --learners 4 --port 65533
 rejects 'cannot be the same' class --learners 2 -- --record exam.rec
 rejects 'come after --' class --learners 2 bundled
+rejects 'expects ADDRESS:PORT' class --learners 2 --data ../data0 --listen 127.0.0.1
+rejects 'no address of this computer' class --learners 2 --data ../data0 --listen everywhere:0
 
 free_port() { # of a run of six that look free
   local port=$((20000 + $$ % 20000 / 8 * 8)) i used
@@ -91,4 +95,72 @@ status=0
 kill -TERM "$job"
 wait "$job" || status=$?
 ((status == 0)) || wrong "exit $status after SIGTERM, expected 0"
+
+python=python3
+[[ -x /usr/bin/python3 ]] && python=/usr/bin/python3
+client() { "$python" "$here/class_door.py" "$@"; }
+answers() { # PATTERN WORDS...: what the class's door answers
+  local got
+  got=$(client "${@:2}" 2>&1 || true)
+  grep -qE -- "$1" <<<"$got" || wrong "'${*:2}' got '${got:0:300}', expected $1"
+}
+open_class() { # WORDS...: a class on the network; sets job, at, code and secret
+  "$SONDE" class --port "$port" --program "$FAKE_LEARNER" --listen 127.0.0.1:0 --data data "$@" >"$out" 2>"$err" </dev/null &
+  job=$!
+  wait_for '^Certificate: '
+  at=$(sed -n 's/^Join at: //p' "$out") code=$(sed -n 's/^Code: //p' "$out")
+  secret=$(sed -n 's/^Teacher: .*#//p' "$out")
+}
+end_class() {
+  kill -INT "$job"
+  wait "$job" || wrong "the class ended with $?"
+}
+
+checks=$((checks + 1)) # who joins gets a place and a program; the code and the secret open what they are for
+rm -f pid.*
+open_class --learners 2
+[[ $(stat -c %a data/class.pem data/teacher.token | sort -u) == 600 ]] || wrong "others can read the class's secrets"
+print=$(client fingerprint "$at")
+grep -qF "SHA-256 $print" "$out" || wrong "the certificate is not the one whose fingerprint was printed"
+compgen -G 'pid.*' >/dev/null && wrong "a program runs for nobody"
+answers '^200 ' get "$at" ''
+answers '^401 ' join "$at" AAAA-AAAA Anna
+answers '^200 \{"place":1,"token":"[0-9a-f]{32}"\}' join "$at" "$code" Anna
+wait_for "Anna: exam, case case-$port,"
+answers '^409 Anna has a place already' join "$at" "$code" Anna
+answers '^404 Zoe is not in this class' join "$at" "$code" Zoe watcher
+watcher=$(client join "$at" "$code" Anna watcher | grep -oE '[0-9a-f]{32}')
+answers '^200 \{"place":2,' join "$at" "${code,,}" 'Bo & Co'
+wait_for "Bo & Co: exam, case case-$((port + 1)),"
+answers '^503 all places' join "$at" "$code" Chris
+answers '^401 ' get "$at" class.json "$watcher"
+answers '"wrong":2,.*"name":"Anna".*"name":"Bo & Co"' get "$at" class.json "$secret"
+token=$(client get "$at" class.json "$secret" | grep -oE '"learner_token":"[0-9a-f]{32}"' | head -1 | grep -oE '[0-9a-f]{32}')
+[[ -n $token && $token != "$watcher" ]] || wrong "a watcher has the learner's secret"
+answers '^200 \{"trainee":"Anna"' get "$at" 1/status.json "$token"
+answers '^404 ' get "$at" 2/status.json "$token" # the fake program's answer to a stranger
+
+checks=$((checks + 1)) # strangers that hold every connection cost nobody else
+mkfifo hold
+client hostile "$at" 400 <hold >held &
+stranger=$!
+exec 9>hold
+for ((i = 0; i < 1200; ++i)); do grep -q held held && break; sleep 0.1; done
+answers '^200 \{"trainee":"Anna"' get "$at" 1/status.json "$token"
+exec 9>&-
+wait "$stranger" || true
+end_class
+
+checks=$((checks + 1)) # the same certificate and teacher's address next time, another code
+before="$secret $code"
+open_class --names 'Anna,Bo'
+[[ $(client fingerprint "$at") == "$print" && $secret == "${before% *}" && $code != "${before#* }" ]] ||
+  wrong "another certificate or secret at the second start, or the same code"
+wait_for "Bo: exam" # who is on the list has a program at once
+answers '^403 Chris is not on the list' join "$at" "$code" Chris
+answers '^200 \{"place":2,' join "$at" "$code" Bo
+end_class
+chmod 644 data/class.pem
+run class --learners 1 --port "$port" --program "$FAKE_LEARNER" --listen 127.0.0.1:0 --data data
+((status != 0)) && grep -q 'only you can read' "$err" || wrong "took a key that others can read"
 finish

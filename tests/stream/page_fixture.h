@@ -90,8 +90,11 @@ static inline int start_server(void **state) {
   page_source source = source_of(s);
   snprintf(f->directory, sizeof f->directory, "/tmp/sonde-exams-XXXXXX");
   if (!mkdtemp(f->directory)) return -1;
-  sonde_page_def def = {
-      .token = WS_TOKEN, .exams_directory = f->directory, .user = f, .request = note_request};
+  sonde_page_def def = {.token = WS_TOKEN,
+                        .watcher_token = WS_GUEST,
+                        .exams_directory = f->directory,
+                        .user = f,
+                        .request = note_request};
   if (page_server_start(&def, &source, &f->server, NULL)) return -1;
   f->port = f->server->port;
   *state = f;

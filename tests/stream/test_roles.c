@@ -6,16 +6,27 @@ static const char ANNA[] = "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa";
 static const char BO[] = "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb";
 
 // Opens a socket as the page with that id does.
-static int visit(fixture *f, const char *id, const char *token) {
+static int open_page(fixture *f, const char *id, const char *token, int *s) {
   char request[640], head[1024];
   snprintf(request, sizeof request,
            "GET /ws?client=%s HTTP/1.1\r\nHost: 127.0.0.1:%u\r\nUpgrade: websocket\r\n"
            "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
            "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: sonde, %s\r\n\r\n",
            id, (unsigned)f->port, token);
-  int s = tcp_connect(f->port, 0);
-  assert_int_equal(http_head(s, request, head, sizeof head), 101);
+  *s = tcp_connect(f->port, 0);
+  return http_head(*s, request, head, sizeof head);
+}
+
+static int visit(fixture *f, const char *id, const char *token) {
+  int s;
+  assert_int_equal(open_page(f, id, token, &s), 101);
   return s;
+}
+
+static int refused(fixture *f, const char *token) {
+  int s, code = open_page(f, BO, token, &s);
+  close(s);
+  return code;
 }
 
 static bool told(int s, bool controls, const char *role, const char *holder, const char *may) {
@@ -171,6 +182,27 @@ static void a_watcher_comments_and_does_nothing_else(void **state) {
   close(bo);
 }
 
+static void who_may_only_watch_takes_nobodys_place(void **state) {
+  fixture *f = *state;
+  int guest[PAGE_GUESTS], here[PAGE_CLIENTS - PAGE_GUESTS];
+  guest[0] = visit(f, BO, WS_GUEST);
+  assert_true(told(guest[0], false, "watcher", "nobody", "")); // though nobody controls
+  act(guest[0], "take");
+  assert_true(ws_expect(guest[0], "may not do that"));
+  ws_say(guest[0], GOAL);
+  assert_true(ws_expect(guest[0], "only watches"));
+  int anna = visit(f, ANNA, WS_TOKEN);
+  assert_true(told(anna, true, "learner", "learner", "")); // to a guest she cannot give control
+  for (int i = 1; i < PAGE_GUESTS; ++i) guest[i] = visit(f, BO, WS_GUEST);
+  assert_int_equal(refused(f, WS_GUEST), 503);
+  for (int i = 1; i < PAGE_CLIENTS - PAGE_GUESTS; ++i)
+    here[i] = visit(f, BO, f->server->teacher_token); // there is room for the others all the same
+  for (int i = 1; i < PAGE_CLIENTS - PAGE_GUESTS; ++i) close(here[i]);
+  close(anna);
+  assert_true(told(guest[0], false, "watcher", "nobody", ""));
+  for (int i = 0; i < PAGE_GUESTS; ++i) close(guest[i]);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       SERVER_TEST(after_a_while_the_next_one_follows),
@@ -179,6 +211,7 @@ int main(void) {
       SERVER_TEST(a_teacher_takes_control_and_gives_it_back),
       SERVER_TEST(a_learner_lends_control_and_takes_it_back),
       SERVER_TEST(a_watcher_comments_and_does_nothing_else),
+      SERVER_TEST(who_may_only_watch_takes_nobodys_place),
   };
   return cmocka_run_group_tests(tests, start_server, stop_server);
 }

@@ -47,6 +47,8 @@ static inline int http_head(int s, const char *request, char *head, size_t size)
 
 static const char WS_TOKEN[] = "00112233445566778899aabbccddeeff"; // of the servers in these tests
 
+static const char WS_GUEST[] = "0123456789abcdef0123456789abcdef"; // who may only watch
+
 // Opens a WebSocket with the given header lines. @return socket, or minus the HTTP code that
 // refused
 static inline int ws_open_with(uint16_t port, const char *host, const char *lines,

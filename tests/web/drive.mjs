@@ -7,8 +7,8 @@ export const PATIENCE_MS = 300000;
 export const browserPath = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find(existsSync);
 
 /** Speaks English, whatever the machine does, unless a context names another locale. */
-export const openBrowser = (chromium, more = []) =>
-  chromium.launch({ executablePath: browserPath, args: ["--lang=en-US", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more] });
+export const openBrowser = (chromium, more = [], program = null) =>
+  chromium.launch({ executablePath: program || browserPath, args: ["--lang=en-US", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more] });
 
 /** The address that the program prints, in its parts; null when the text has none. */
 export function findAddress(text) {

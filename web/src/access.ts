@@ -45,7 +45,7 @@ export function token(): string {
 /** Whether the program is there and does not know this page's token. */
 export async function isStranger(): Promise<boolean> {
   try {
-    const answer = await fetch("/status.json", { headers: { Authorization: `Bearer ${token()}` }, cache: "no-store" });
+    const answer = await fetch("status.json", { headers: { Authorization: `Bearer ${token()}` }, cache: "no-store" });
     return answer.status === 401;
   } catch {
     return false; // not there

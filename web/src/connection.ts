@@ -164,7 +164,10 @@ export class Connection {
   private open(): void {
     window.clearTimeout(this.timer);
     if (this.socket) this.socket.onclose = null;
-    const socket = new WebSocket(`ws://${location.host}/ws?client=${this.id}`, token() ? ["sonde", token()] : ["sonde"]);
+    // Beside the page, wherever it lies: a class serves several pages on one port.
+    const at = new URL(`ws?client=${this.id}`, location.href.replace(/^http/, "ws"));
+    at.hash = "";
+    const socket = new WebSocket(at, token() ? ["sonde", token()] : ["sonde"]);
     let greeted = false;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {

@@ -99,7 +99,7 @@ export class HistoryDialog {
     const score = make("td", e.passed ? "good" : "bad", e.score === null ? t("history.no_score") : t(e.passed ? "history.passed" : "history.not_passed", { score: e.score.toFixed(0) }));
     const does = make("td", "does");
     const report = make("a", "button", t("history.report"));
-    Object.assign(report, { href: `${e.report}#lang=${language}`, target: "_blank", rel: "noopener" });
+    Object.assign(report, { href: `.${e.report}#lang=${language}`, target: "_blank", rel: "noopener" });
     report.setAttribute("aria-label", t("history.report_of", { title: e.title, when }));
     const replay = button(t("page.replay"), () => (this.box.close(), this.replay(e.id)));
     replay.setAttribute("aria-label", t("history.replay_of", { title: e.title, when }));

@@ -136,7 +136,7 @@ export class ResultDialog {
   private foot(exam: Exam, result: Result, controls: boolean, comments: boolean): HTMLElement {
     const row = make("div", "actions");
     const report = make("a", "primary button", t("result.report"));
-    Object.assign(report, { href: `${result.report}#lang=${language}`, target: "_blank", rel: "noopener" });
+    Object.assign(report, { href: `.${result.report}#lang=${language}`, target: "_blank", rel: "noopener" });
     const l = exam.lesson;
     const later = [
       button(t("result.replay"), () => this.actions.replay(exam.exam)),

@@ -216,7 +216,7 @@ export class Worksheet {
       const key = `${sheet!.exam}/${p.number}`;
       if (this.pixels.has(key)) continue;
       this.pixels.set(key, "");
-      const answer = await fetch(`/worksheet/${key}.png`, { headers: { Authorization: `Bearer ${token()}` } }).catch(() => null);
+      const answer = await fetch(`worksheet/${key}.png`, { headers: { Authorization: `Bearer ${token()}` } }).catch(() => null);
       if (!answer?.ok) {
         this.pixels.delete(key);
         continue;

@@ -125,16 +125,22 @@ bool page_client_next(page_client *client, page_out *out) {
   return out->head_size > 0;
 }
 
-page_client *page_client_join(sonde_page_server *server, const char *id, bool teacher) {
+page_client *page_client_join(sonde_page_server *server, const char *id, page_who who) {
   pthread_mutex_lock(&server->lock);
   page_client *client = NULL;
-  for (int i = 0; i < PAGE_CLIENTS && !client; ++i)
-    if (!server->client[i].here) client = &server->client[i];
+  const bool guest = who == PAGE_WATCHER;
+  int alike = 0;
+  for (int i = 0; i < PAGE_CLIENTS; ++i) {
+    if (!server->client[i].here && !client) client = &server->client[i];
+    alike += server->client[i].here && server->client[i].guest == guest;
+  }
+  if (alike >= (guest ? PAGE_GUESTS : PAGE_CLIENTS - PAGE_GUESTS)) client = NULL;
   if (client) {
     page_buffer kept = client->out; // the buffer serves the next client of the slot
     *client = (page_client){.server = server, .here = true, .out = kept};
     client->joined = ++server->joined;
-    client->teacher = teacher;
+    client->teacher = who == PAGE_TEACHER;
+    client->guest = guest;
     snprintf(client->id, sizeof client->id, "%s", id);
     page_roles_join(client);
     client->tokens = PAGE_BURST;

@@ -14,5 +14,7 @@ typedef struct page_file {
 
 // The built-in files; *count receives their number. @thread any
 const page_file *page_files(uint32_t *count);
+// Those of a class's door: /, /class.js, /class.css. @thread any
+const page_file *page_class_files(uint32_t *count);
 
 #endif

@@ -34,17 +34,7 @@ static const char PAGE_POLICY[] =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-// Body of an answer. `policy` NULL: the page's own; `owned` is freed when all is sent, NULL:
-// nothing; `mapped` bytes of it are a file's, 0: it is allocated.
-typedef struct page_body {
-  const char *type, *policy;
-  const void *bytes;
-  size_t size, mapped;
-  void *owned;
-  bool gzip;
-} page_body;
-
-static void send_head(page_out *out, int code, const char *reason, const page_body *body) {
+void page_http_send(page_out *out, int code, const char *reason, const page_body *body) {
   int size =
       snprintf(out->head, sizeof out->head,
                "HTTP/1.1 %d %s\r\n"
@@ -70,9 +60,10 @@ static void send_head(page_out *out, int code, const char *reason, const page_bo
 }
 
 static void send_refusal(page_out *out, int code, const char *reason, const char *sentence) {
-  send_head(out, code, reason,
-            &(page_body){
-                .type = "text/plain; charset=utf-8", .bytes = sentence, .size = strlen(sentence)});
+  page_http_send(out, code, reason,
+                 &(page_body){.type = "text/plain; charset=utf-8",
+                              .bytes = sentence,
+                              .size = strlen(sentence)});
 }
 
 void page_http_refuse(page_out *out, int code) {
@@ -101,7 +92,7 @@ static void send_file(const sonde_page_server *server, const page_file *file, pa
     body.bytes = body.owned = bytes;
     body.gzip = false;
   }
-  send_head(out, 200, "OK", &body);
+  page_http_send(out, 200, "OK", &body);
 }
 
 // ---- who may have what
@@ -112,7 +103,8 @@ static bool knows_token(const sonde_page_server *server, const page_request *req
   if (strncasecmp(field, SCHEME, sizeof SCHEME - 1) != 0) return false;
   const char *given = field + sizeof SCHEME - 1;
   bool learner = page_secret_equal(server->token, given);
-  return page_secret_equal(server->teacher_token, given) || learner;
+  bool watcher = page_secret_equal(server->watcher_token, given);
+  return page_secret_equal(server->teacher_token, given) || learner || watcher;
 }
 
 static void send_stranger(page_out *out) {
@@ -200,7 +192,7 @@ static bool answer_document(const sonde_page_server *server, const page_request 
       send_refusal(out, 404, "Not Found", "there is no such exam\n");
     } else {
       body.bytes = body.owned = bytes;
-      send_head(out, 200, "OK", &body);
+      page_http_send(out, 200, "OK", &body);
     }
     return true;
   }
@@ -222,6 +214,7 @@ static void upgrade(sonde_page_server *server, const page_request *request, page
     char word[PAGE_FIELD_TEXT];
     snprintf(word, sizeof word, "%.*s", (int)count, p);
     if (page_secret_equal(server->token, word)) who = PAGE_LEARNER;
+    if (page_secret_equal(server->watcher_token, word)) who = PAGE_WATCHER;
     if (page_secret_equal(server->teacher_token, word)) who = PAGE_TEACHER;
     p += count + strspn(p + count, ", ");
   }
@@ -235,7 +228,7 @@ static void upgrade(sonde_page_server *server, const page_request *request, page
   } else if (strcasecmp(request->field[PAGE_UPGRADE], "websocket") != 0 || strlen(key) != 24 ||
              strcmp(request->field[PAGE_WS_VERSION], "13") != 0) {
     page_http_refuse(out, 400);
-  } else if (!(*client = page_client_join(server, id, who == PAGE_TEACHER))) {
+  } else if (!(*client = page_client_join(server, id, who))) {
     send_refusal(out, 503, "Service Unavailable", "no more pages can connect\n");
   } else {
     char accept[PAGE_ACCEPT_TEXT];
@@ -270,7 +263,7 @@ void page_http_answer(sonde_page_server *server, const char *head, size_t size, 
       else
         send_refusal(out, 426, "Upgrade Required", "/ws is a WebSocket\n");
     } else if (strcmp(request.path, "/favicon.ico") == 0) {
-      send_head(out, 204, "No Content", &(page_body){.type = "image/x-icon"});
+      page_http_send(out, 204, "No Content", &(page_body){.type = "image/x-icon"});
     } else if (strcmp(request.path, "/status.json") == 0) {
       if (knows_token(server, &request)) {
         pthread_mutex_lock(&server->lock);
@@ -282,9 +275,10 @@ void page_http_answer(sonde_page_server *server, const char *head, size_t size, 
         if (!text)
           send_refusal(out, 503, "Service Unavailable", "out of memory\n");
         else
-          send_head(out, 200, "OK",
-                    &(page_body){
-                        .type = "application/json", .bytes = text, .size = length, .owned = text});
+          page_http_send(
+              out, 200, "OK",
+              &(page_body){
+                  .type = "application/json", .bytes = text, .size = length, .owned = text});
       } else
         send_stranger(out);
     } else if (!answer_document(server, &request, out)) {

@@ -1,7 +1,8 @@
 // Who controls the probe. The learner is the owner: the client with the learner's token that came
 // first. A teacher may take control and gives it back; the learner may lend it to another. An owner
 // that is gone (a reload, a lost connection) is waited for and recognised by its id; meanwhile
-// another may stand in, and after that the next watcher is the owner.
+// another may stand in, and after that the next watcher is the owner. Who came with the watcher's
+// token only watches.
 #include "stream/page_server.h"
 
 #include "base/clock.h"
@@ -20,7 +21,7 @@ static page_client *first_other(sonde_page_server *server, const page_client *se
   page_client *first = NULL;
   for (int i = 0; i < PAGE_CLIENTS; ++i) {
     page_client *other = &server->client[i];
-    if (!other->here || other == self || other->teacher != teacher) continue;
+    if (!other->here || other == self || other->teacher != teacher || other->guest) continue;
     if (!first || other->joined < first->joined) first = other;
   }
   return first;
@@ -28,6 +29,7 @@ static page_client *first_other(sonde_page_server *server, const page_client *se
 
 static page_may may(const page_client *client) {
   sonde_page_server *server = client->server;
+  if (client->guest) return PAGE_MAY_NOTHING;
   bool owner = is_owner(client);
   if (page_client_controls(client)) {
     if (!owner) return server->owner ? PAGE_MAY_RETURN : PAGE_MAY_NOTHING;
@@ -79,7 +81,7 @@ static bool stands_in(const sonde_page_server *server) {
 void page_roles_join(page_client *client) {
   sonde_page_server *server = client->server;
   SONDE_ASSERT(client->here && memchr(client->id, 0, sizeof client->id));
-  if (client->teacher) return;
+  if (client->teacher || client->guest) return;
   bool known = client->id[0] && strcmp(client->id, server->owner_id) == 0;
   bool alone = !first_other(server, client, false);
   if (known && (!server->owner || stands_in(server)))

@@ -254,7 +254,7 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   if (def->exams_directory)
     snprintf(server->exams_directory, sizeof server->exams_directory, "%s", def->exams_directory);
   server->def.data_directory = server->def.exams_directory = server->def.model_path = NULL;
-  server->def.token = server->def.teacher_token = NULL;
+  server->def.token = server->def.teacher_token = server->def.watcher_token = NULL;
   server->patience = (page_patience){
       .ask_s = 10, .answer_s = 30, .end_s = 2, .ping_s = 2, .silent_s = 6, .return_s = 60};
   pthread_mutex_init(&server->lock, NULL);
@@ -263,6 +263,8 @@ sonde_status page_server_start(const sonde_page_def *def, const page_source *sou
   for (int i = 0; i < PAGE_CONNECTIONS; ++i) server->connection[i].socket = -1;
   sonde_status status = copy_token(server->token, def->token, error);
   if (!status) status = copy_token(server->teacher_token, def->teacher_token, error);
+  if (!status && def->watcher_token)
+    status = copy_token(server->watcher_token, def->watcher_token, error);
   if (!status) status = page_net_open(server, def->port, error);
   if (!status) status = page_server_show(server, source, error);
   if (!status) status = page_net_start(server, error);

@@ -16,7 +16,8 @@
 #include <pthread.h>
 
 enum {
-  PAGE_CLIENTS = 4,
+  PAGE_CLIENTS = 6,
+  PAGE_GUESTS = 2, // of them, who came with the watcher's token: they take nobody else's place
   PAGE_CONNECTIONS = 128, // of all kinds; the oldest that is no client makes room for another
   PAGE_REPLY_HEAD = 1024, // bytes, head of an answer
   PAGE_IN_FLIGHT = 2,
@@ -67,7 +68,7 @@ typedef struct page_client {
   bool leaving;              // to be closed
   uint64_t joined;           // order of arrival
   char id[PAGE_SECRET_TEXT]; // that its page chose, the same after a reload; empty: none
-  bool teacher;              // came with the teacher's token
+  bool teacher, guest;       // came with the teacher's, with the watcher's token
   uint32_t greeted;          // generation whose hello was sent; 0: none
   page_scene *scene;         // geometry under way; one reference; NULL: none
   uint32_t scene_next;       // its message to be sent next
@@ -132,10 +133,11 @@ struct sonde_page_server {
   char exams_directory[512]; // empty: none
   char data_directory[512];  // empty: serve from memory
   char token[PAGE_SECRET_TEXT], teacher_token[PAGE_SECRET_TEXT];
-  page_client *owner;              // the learner's; NULL: gone
-  page_client *borrower;           // who controls in the owner's place; NULL: nobody does
-  char owner_id[PAGE_SECRET_TEXT]; // of the owner, also when it is gone
-  double owner_until_s;            // how long it is waited for
+  char watcher_token[PAGE_SECRET_TEXT]; // empty: nobody comes only to watch
+  page_client *owner;                   // the learner's; NULL: gone
+  page_client *borrower;                // who controls in the owner's place; NULL: nobody does
+  char owner_id[PAGE_SECRET_TEXT];      // of the owner, also when it is gone
+  double owner_until_s;                 // how long it is waited for
   page_patience patience;
   int listener, wake; // sockets; `wake` ends a wait of the sockets' thread
   uint16_t port;
@@ -180,6 +182,17 @@ void page_net_stop(sonde_page_server *server);
 // is answered by 101 and sets *client, which then belongs to the connection.
 void page_http_answer(sonde_page_server *server, const char *head, size_t size, page_out *out,
                       page_client **client);
+// Body of an answer. `policy` NULL: the page's own; `owned` is freed when all is sent, NULL:
+// nothing; `mapped` bytes of it are a file's, 0: it is allocated.
+typedef struct page_body {
+  const char *type, *policy;
+  const void *bytes;
+  size_t size, mapped;
+  void *owned;
+  bool gzip;
+} page_body;
+// Fills an answer with the security headers that all answers have.
+void page_http_send(page_out *out, int code, const char *reason, const page_body *body);
 // Refuses a request that is not even a head.
 void page_http_refuse(page_out *out, int code);
 // Only the loopback names with our port pass; a browser that was lured by a foreign name sends that
@@ -189,7 +202,7 @@ bool page_host_allowed(const char *host, uint16_t port);
 bool page_origin_allowed(const char *origin, uint16_t port);
 
 // page_client.c. A new client, NULL when there is no free slot. Takes the lock.
-page_client *page_client_join(sonde_page_server *server, const char *id, bool teacher);
+page_client *page_client_join(sonde_page_server *server, const char *id, page_who who);
 // A whole text message of a client; false ends the connection. Takes the lock.
 bool page_client_hear(page_client *client, const char *data, size_t size);
 // The message that is to be sent next; false when there is none. Takes the lock.

@@ -1,0 +1,16 @@
+// The page of a class's door: who has the code joins; who has the teacher's address has the board.
+
+import { takeToken, token } from "./access";
+import { openBoard } from "./class_board";
+import { openJoin } from "./class_join";
+import { find } from "./dom";
+
+function open(): void {
+  const room = find("class");
+  if (token()) openBoard(room, token());
+  else openJoin(room);
+}
+
+takeToken();
+open();
+window.addEventListener("hashchange", () => takeToken() && location.reload());

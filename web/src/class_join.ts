@@ -1,0 +1,106 @@
+// Joining a class: name and code, then the own page on the learner's place.
+
+import { announce, make, recall, remember } from "./dom";
+
+interface Place {
+  place: number;
+  token: string;
+}
+
+const addressOf = (at: Place): string => `${at.place}/#${at.token}`;
+
+/** A place that this browser was given before, as long as its program knows it. */
+function known(): Place | null {
+  try {
+    const at = JSON.parse(recall("place")) as Place;
+    return Number.isInteger(at.place) && /^[0-9a-f]{32}$/.test(at.token) ? at : null;
+  } catch {
+    return null;
+  }
+}
+
+const status = async (at: Place): Promise<number> => {
+  try {
+    return (await fetch(`${at.place}/status.json`, { headers: { Authorization: `Bearer ${at.token}` }, cache: "no-store" })).status;
+  } catch {
+    return 0;
+  }
+};
+
+/** Goes to a place as soon as its program answers. */
+async function enter(at: Place, say: (sentence: string) => void): Promise<void> {
+  say("Your program is starting");
+  while ((await status(at)) !== 200) await new Promise((done) => setTimeout(done, 500));
+  location.assign(addressOf(at));
+}
+
+function choice(value: string, text: string, on: boolean): HTMLElement {
+  const box = make("label");
+  const input = make("input");
+  Object.assign(input, { type: "radio", name: "role", value, checked: on });
+  box.append(input, text);
+  return box;
+}
+
+export function openJoin(room: HTMLElement): void {
+  const form = make("form", "join");
+  const field = (id: string, text: string, more: object): HTMLInputElement => {
+    const box = make("label", "", text);
+    const input = make("input");
+    Object.assign(input, { id, required: true, autocomplete: "off", ...more });
+    box.append(input);
+    form.append(box);
+    return input;
+  };
+  form.append(make("h1", "", "Join the class"));
+  const roles = make("fieldset");
+  roles.append(choice("learner", "I examine", true), choice("watcher", "I watch somebody", false));
+  form.append(roles);
+  const name = field("name", "Your name", { maxLength: 40, value: recall("trainee") });
+  const code = field("code", "Code of the class", { maxLength: 12, spellcheck: false });
+  const go = make("button", "primary", "Join");
+  const said = make("p", "warn");
+  said.id = "said";
+  said.setAttribute("role", "status");
+  form.append(go, said);
+  const back = known();
+  if (back) {
+    const again = make("button", "", "Back to my place");
+    again.type = "button";
+    again.hidden = true;
+    again.onclick = () => void enter(back, say);
+    form.append(again);
+    void status(back).then((found) => (again.hidden = found !== 200));
+  }
+  room.replaceChildren(form);
+  const watches = (): boolean => form.querySelector<HTMLInputElement>("input[value=watcher]")!.checked;
+  roles.onchange = () => (name.previousSibling!.textContent = watches() ? "Whom you watch" : "Your name");
+  const say = (sentence: string): void => {
+    said.textContent = sentence;
+    announce(sentence);
+  };
+  form.onsubmit = (event) => {
+    event.preventDefault();
+    void join();
+  };
+  async function join(): Promise<void> {
+    go.disabled = true;
+    say("Asking");
+    const role = watches() ? "watcher" : "learner";
+    try {
+      const answer = await fetch(`join?name=${encodeURIComponent(name.value.trim())}&role=${role}`, { headers: { Authorization: `Bearer ${code.value.trim()}` }, cache: "no-store" });
+      if (!answer.ok) return say(await answer.text());
+      const at = (await answer.json()) as Place;
+      if (role === "learner") {
+        remember("place", JSON.stringify(at));
+        remember("trainee", name.value.trim());
+      }
+      await enter(at, say);
+    } catch {
+      say("The class does not answer; try again");
+    } finally {
+      go.disabled = false;
+    }
+  }
+  (name.value ? code : name).focus();
+}
