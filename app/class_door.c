@@ -2,6 +2,7 @@
 // only; the program's thread takes from that list who has come (class_door_turn).
 #include "class_door.h"
 
+#include "class_results.h"
 #include "page_token.h"
 
 #include <arpa/inet.h>
@@ -29,6 +30,7 @@ struct class_door {
   uint32_t count;
   place places[CLASS_LEARNERS];
   double tell_s; // clock of the next news to the board
+  class_results results;
 };
 
 // ---- joining
@@ -101,6 +103,7 @@ int class_door_open(const class_door_def *def, const class_room *room, class_doo
   pthread_mutex_init(&d->lock, NULL);
   d->count = room->count;
   d->listed = def->listed;
+  snprintf(d->results.log, sizeof d->results.log, "%s/exams.sqlite", def->exams);
   for (uint32_t i = 0; i < room->count; ++i) {
     const class_learner *learner = &room->learner[i];
     if (learner->taken) memcpy(d->places[i].name, learner->name, sizeof d->places[i].name);
@@ -188,6 +191,7 @@ void class_door_turn(class_door *d, class_room *room, class_say say) {
   if (class_now_s() < d->tell_s) return;
   d->tell_s = class_now_s() + 1;
   tell(d, room);
+  class_results_tell(&d->results, d->address, d->door);
 }
 
 void class_door_close(class_door *d) {

@@ -9,8 +9,9 @@ typedef struct class_door class_door;
 typedef struct class_door_def {
   const char *address; // IPv4 address of this computer
   uint16_t port;
-  const char *data; // directory of certificate and teacher's secret, made when it is missing
-  bool listed;      // only who is on the list of names may join
+  const char *data;  // directory of certificate and teacher's secret, made when it is missing
+  const char *exams; // directory of the learners' exams
+  bool listed;       // only who is on the list of names may join
 } class_door_def;
 
 // Opens the port for a class whose tokens are made, and prints code, addresses and fingerprint.

@@ -177,7 +177,8 @@ static int begin(const options *s, class_room *room, class_door **door) {
         sonde_page_token_make(room->learner[i].watcher_token, &error))
       return app_fail(VERB, &error);
   if (s->listen) {
-    char data[4096], address[64];
+    char data[4096], exams[4096], address[64];
+    const char *given = NULL; // to every learner's program
     const char *colon = strrchr(s->listen, ':');
     long port = 0;
     if (!colon || (size_t)(colon - s->listen) >= sizeof address)
@@ -185,7 +186,13 @@ static int begin(const options *s, class_room *room, class_door **door) {
     if (!app_parse_integer(VERB, "listen", colon + 1, 0, 65535, &port)) return APP_BAD_INPUT;
     snprintf(address, sizeof address, "%.*s", (int)(colon - s->listen), s->listen);
     app_data_home(s->data, "class", data, sizeof data);
-    class_door_def def = {address, (uint16_t)port, data, s->names != NULL};
+    for (int i = 0; i < room->argument_count; ++i) {
+      const char *word = room->arguments[i];
+      if (strncmp(word, "--exams=", 8) == 0) given = word + 8;
+      if (strcmp(word, "--exams") == 0) given = room->arguments[i + 1];
+    }
+    app_data_home(given, "exams", exams, sizeof exams);
+    class_door_def def = {address, (uint16_t)port, data, exams, s->names != NULL};
     int code = class_door_open(&def, room, door);
     if (code != APP_OK) return code;
   }

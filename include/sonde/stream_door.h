@@ -6,7 +6,9 @@
 #ifndef SONDE_STREAM_DOOR_H
 #define SONDE_STREAM_DOOR_H
 
+#include "sonde/base_json.h"
 #include "sonde/stream.h"
+#include "sonde/trainer_log.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -68,6 +70,11 @@ SONDE_API uint64_t sonde_door_wrong(sonde_door *door);
 /** The newest version of a text, which is copied. @return MEMORY @thread any */
 SONDE_API sonde_status sonde_door_publish(sonde_door *door, sonde_door_text which, const char *text,
                                           sonde_error *error);
+/** Writes an exam of the log as one statement of xAPI 1.0.3. Equal exams give equal bytes.
+ *  @param home address that names the system, e.g. the class's, with "/" at its end; less than 200
+ *  characters @thread owner */
+SONDE_API void sonde_door_statement(const sonde_log_entry *entry, const char *home,
+                                    sonde_json_out *out);
 /** Closes all connections and the port. NULL is ignored. @thread owner */
 SONDE_API void sonde_door_close(sonde_door *door);
 

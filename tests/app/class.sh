@@ -153,10 +153,32 @@ end_class
 
 checks=$((checks + 1)) # the same certificate and teacher's address next time, another code
 before="$secret $code"
-open_class --names 'Anna,Bo'
+mkdir exams
+"$SONDE" exam --recover exams >/dev/null # makes a log without exams
+"$python" - <<'ROWS'
+import sqlite3
+log = sqlite3.connect("exams/exams.sqlite")
+columns = [row[1:3] for row in log.execute("PRAGMA table_info(exams)")][1:]
+for i, (name, score, gone) in enumerate([("Anna", 41.5, 0), ("Anna", 88, 0), ('Bo, "B"', 72.25, 0), ("Bo", 0, 1)]):
+    row = {"id": f"2026-{i}", "trainee": name, "case_id": "healthy-lean", "case_title": "First walk", "protocol": "two_point",
+           "guidance": "full", "date": f"2026-11-2{i}T04:40:00Z", "score": score, "passed": int(score > 60), "correct": 1,
+           "interrupted": gone, "seconds": 83.21}
+    values = [row.get(column, "" if kind == "TEXT" else 0) for column, kind in columns]
+    log.execute(f"INSERT INTO exams ({','.join(c for c, _ in columns)}) VALUES ({','.join('?' * len(columns))})", values)
+log.commit()
+ROWS
+open_class --names 'Anna,Bo' -- --exams exams
 [[ $(client fingerprint "$at") == "$print" && $secret == "${before% *}" && $code != "${before#* }" ]] ||
   wrong "another certificate or secret at the second start, or the same code"
 wait_for "Bo: exam" # who is on the list has a program at once
+answers '"trainee":"Anna".*"score":88,"passed":true,"correct":true,"seconds":83.21' get "$at" results.json "$secret"
+client get "$at" results.csv "$secret" | tr -d '\r' >table
+[[ $(grep -c . table) == 4 ]] || wrong "the table has $(grep -c . table) lines, expected a head and 3 exams"
+grep -qF '"2026-11-22T04:40:00Z","Bo, ""B""","healthy-lean","First walk","two_point","full",72.2,1,1,83.2,0' table ||
+  wrong "the table lacks Bo's exam: $(head -2 table)"
+client get "$at" statements.jsonl "$secret" | sed '1s/^200 //' >statements
+"$python" "$here/check_xapi.py" statements 4 || wrong "no statements of xAPI"
+answers '^401 ' get "$at" statements.jsonl "$watcher"
 answers '^403 Chris is not on the list' join "$at" "$code" Chris
 answers '^200 \{"place":2,' join "$at" "$code" Bo
 end_class

@@ -187,7 +187,7 @@ static bool answer_document(const sonde_page_server *server, const page_request 
     if (!known) {
       send_stranger(out);
     } else if (body.owned) {
-      send_head(out, 200, "OK", &body);
+      page_http_send(out, 200, "OK", &body);
     } else if (sonde_file_load(path, &bytes, &body.size, NULL)) {
       send_refusal(out, 404, "Not Found", "there is no such exam\n");
     } else {

@@ -1,0 +1,85 @@
+// The finished exams of a class, read from the log when it has changed.
+#include "class_results.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <sys/stat.h>
+
+static void put_exam(sonde_json_out *out, const sonde_log_entry *e) {
+  sonde_json_begin_object(out, NULL);
+  sonde_json_put_text(out, "id", e->id);
+  sonde_json_put_text(out, "trainee", e->trainee);
+  sonde_json_put_text(out, "case", e->case_id);
+  sonde_json_put_text(out, "title", e->case_title);
+  sonde_json_put_text(out, "protocol", e->protocol);
+  sonde_json_put_text(out, "guidance", e->guidance);
+  sonde_json_put_text(out, "date", e->date);
+  sonde_json_put_real(out, "score", e->score, 6);
+  sonde_json_put_bool(out, "passed", e->passed);
+  sonde_json_put_bool(out, "correct", e->correct);
+  sonde_json_put_real(out, "seconds", e->metrics.time_s, 6);
+  sonde_json_put_integer(out, "hints", e->metrics.hints);
+  sonde_json_end(out);
+}
+
+static void put_row(sonde_file *file, const sonde_log_entry *e) {
+  const char *const texts[] = {e->date,       e->trainee,  e->case_id,
+                               e->case_title, e->protocol, e->guidance};
+  for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
+    sonde_csv_put_text(file, texts[i]);
+    sonde_file_printf(file, ",");
+  }
+  sonde_file_printf(file, "%.1f,%d,%d,%.1f,%u\r\n", e->score, e->passed, e->correct,
+                    e->metrics.time_s, (unsigned)e->metrics.hints);
+}
+
+static void publish(sonde_door *door, sonde_door_text which, sonde_file *file) {
+  char *text = NULL;
+  size_t size;
+  if (sonde_file_take(file, &text, &size, NULL)) return;
+  (void)sonde_door_publish(door, which, text, NULL);
+  sonde_free(text);
+}
+
+void class_results_tell(class_results *results, const char *home, sonde_door *door) {
+  struct stat about;
+  sonde_exam_log *log = NULL;
+  sonde_log_entry *entries = NULL;
+  uint32_t count = 0;
+  assert(results->log[0] && home[0]);
+  if (stat(results->log, &about)) return; // no exam yet
+  const long long changed_ns = 1000000000LL * about.st_mtim.tv_sec + about.st_mtim.tv_nsec;
+  if (changed_ns == results->seen_ns) return;
+  sonde_status status = sonde_exam_log_open(results->log, &log, NULL);
+  if (!status) status = sonde_exam_log_list(log, NULL, 0, &entries, &count, NULL);
+  sonde_exam_log_close(log);
+  sonde_json_out list = {.layout = SONDE_JSON_COMPACT}, one = {.layout = SONDE_JSON_COMPACT};
+  sonde_file *table = NULL;
+  if (!status) status = sonde_file_in_memory(&list.file, NULL);
+  if (!status) status = sonde_file_in_memory(&one.file, NULL);
+  if (!status) status = sonde_file_in_memory(&table, NULL);
+  if (!status) {
+    results->seen_ns = changed_ns;
+    sonde_json_begin_object(&list, NULL);
+    sonde_json_begin_list(&list, "exams");
+    sonde_file_printf(table, "date,learner,case,title,protocol,guidance,score,passed,right,"
+                             "seconds,hints\r\n");
+    for (uint32_t i = 0; i < count; ++i) {
+      sonde_door_statement(&entries[i], home, &one);
+      sonde_file_printf(one.file, "\n");
+      if (entries[i].interrupted) continue; // neither score nor answer
+      put_exam(&list, &entries[i]);
+      put_row(table, &entries[i]);
+    }
+    sonde_json_end(&list);
+    sonde_json_end(&list);
+    publish(door, SONDE_DOOR_RESULTS, list.file);
+    publish(door, SONDE_DOOR_STATEMENTS, one.file);
+    publish(door, SONDE_DOOR_TABLE, table);
+  } else {
+    sonde_file_discard(list.file);
+    sonde_file_discard(one.file);
+    sonde_file_discard(table);
+  }
+  sonde_free(entries);
+}
