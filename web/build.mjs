@@ -38,7 +38,8 @@ const plotStyle = `/*! uPlot\n${await read("node_modules/uplot/LICENSE")}*/\n${a
 await writeFile(path.join(out, "style.css"), `${await read("src/palette.css")}\n${await read("style.css")}\n${await read("src/report/worksheet.css")}\n${plotStyle}`);
 await writeFile(path.join(out, "index.html"), await read("index.html"));
 await bundle("class.ts", "class.js");
-for (const name of ["class.html", "class.css"]) await writeFile(path.join(out, name), await read(name));
+await writeFile(path.join(out, "class.html"), await read("class.html"));
+await writeFile(path.join(out, "class.css"), `${await read("src/palette.css")}\n${await read("class.css")}`);
 
 // A report is one file: template, style and script. The marks of title and data stay for the program.
 const report = await bundle("report/main.ts", "report.js");

@@ -3,7 +3,7 @@
 import { takeToken, token } from "./access";
 import { openBoard } from "./class_board";
 import { openJoin } from "./class_join";
-import { find } from "./dom";
+import { find, recall } from "./dom";
 
 function open(): void {
   const room = find("class");
@@ -11,6 +11,9 @@ function open(): void {
   else openJoin(room);
 }
 
+// As the learner's page was left.
+const kept = recall("theme");
+if (kept) document.documentElement.dataset["theme"] = kept;
 takeToken();
 open();
 window.addEventListener("hashchange", () => takeToken() && location.reload());
