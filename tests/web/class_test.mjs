@@ -239,8 +239,9 @@ async function main() {
   await learner.waitForURL(/\/1\/$/);
   await ready(learner);
   await has(learner, true);
-  const back = await learner.evaluate(() => ({ exam: window.sonde.exam.exam, presses: window.sonde.exam.presses.length }));
-  check(back.exam === exam.exam && back.presses === exam.presses, "a learner's page that died comes back to its place, its exam and its presses");
+  // A press that was under way when its page died may have ended meanwhile.
+  await learner.waitForFunction((was) => window.sonde.exam?.exam === was.exam && window.sonde.exam.presses.length >= was.presses, exam);
+  check(true, "a learner's page that died comes back to its place, its exam and its presses");
   await programDies(learner, room);
   check(errors.length === 0, `nothing fails in a page ${errors.join("; ")}`);
   for (const browser of browsers) await browser.close();

@@ -4,6 +4,7 @@ import { takeToken, token } from "./access";
 import { openBoard } from "./class_board";
 import { openJoin } from "./class_join";
 import { find, recall } from "./dom";
+import { language } from "./words/language";
 
 function open(): void {
   const room = find("class");
@@ -14,6 +15,7 @@ function open(): void {
 // As the learner's page was left.
 const kept = recall("theme");
 if (kept) document.documentElement.dataset["theme"] = kept;
+document.documentElement.lang = language;
 takeToken();
 open();
 window.addEventListener("hashchange", () => takeToken() && location.reload());

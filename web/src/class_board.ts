@@ -4,6 +4,7 @@
 import { showResults } from "./class_results";
 import { button, find, make, minutes } from "./dom";
 import { decode, type Exam, type Frame, type TextMessage } from "./protocol";
+import { shown, t, told, translated } from "./words/language";
 
 interface Learner {
   place: number;
@@ -37,7 +38,7 @@ export function progressOf(exam: Exam | null): string {
   const needed = exam.segments.filter((s) => s.needed);
   const decided = needed.filter((s) => s.decision !== "").length;
   const good = exam.presses.filter((p) => p.result === "complete").length;
-  return `${decided} of ${needed.length} segments, ${exam.presses.length} presses (${good} complete)`;
+  return t("class.done", { decided, needed: needed.length, presses: exam.presses.length, good });
 }
 
 class Card {
@@ -48,7 +49,7 @@ class Card {
   private readonly values = new Map<string, HTMLElement>();
   private readonly back = make("code");
   private readonly comment = make("input");
-  private readonly open = make("a", "button", "Open");
+  private readonly open = make("a", "button", t("class.open"));
   private socket: WebSocket | null = null;
   private exam: Exam | null = null;
   private holder = "";
@@ -58,21 +59,22 @@ class Card {
     const head = make("div", "head");
     head.append(this.title, this.state);
     const list = make("dl");
-    for (const key of ["Case", "Force", "Step", "Done", "Score", "Control"]) {
+    for (const key of ["case", "force", "step", "progress", "score", "control"] as const) {
       const value = make("dd");
+      value.dataset["of"] = key;
       this.values.set(key, value);
-      list.append(make("dt", "", key), value);
+      list.append(make("dt", "", t(`class.${key}`)), value);
     }
     const body = make("div", "body");
     this.canvas.setAttribute("role", "img");
     body.append(this.canvas, list);
     const does = make("div", "does");
     Object.assign(this.open, { target: "_blank", rel: "noopener" });
-    Object.assign(this.comment, { maxLength: 400, placeholder: "Comment", autocomplete: "off" });
+    Object.assign(this.comment, { maxLength: 400, placeholder: t("class.comment"), autocomplete: "off" });
     this.comment.onkeydown = (event) => event.key === "Enter" && this.say();
-    does.append(this.open, this.comment, button("Send", () => this.say()));
+    does.append(this.open, this.comment, button(t("class.send"), () => this.say()));
     const again = make("details");
-    again.append(make("summary", "", "Address to come back by"), this.back);
+    again.append(make("summary", "", t("class.come_back")), this.back);
     this.box.append(head, body, does, again);
     this.listen();
   }
@@ -82,13 +84,13 @@ class Card {
     this.learner = learner;
     this.title.textContent = learner.name;
     this.state.textContent = learner.elapsed_s === null ? learner.state : `${learner.state} ${minutes(learner.elapsed_s)}`;
-    this.canvas.setAttribute("aria-label", `Image of ${learner.name}`);
-    this.comment.setAttribute("aria-label", `Comment for ${learner.name}`);
-    this.open.setAttribute("aria-label", `Open ${learner.name}`);
+    this.canvas.setAttribute("aria-label", t("class.image_of", { name: learner.name }));
+    this.comment.setAttribute("aria-label", t("class.comment_for", { name: learner.name }));
+    this.open.setAttribute("aria-label", t("class.open_of", { name: learner.name }));
     this.open.href = `${learner.place}/#${learner.token}`;
     this.back.textContent = `${address}${learner.place}/#${learner.learner_token}`;
-    this.put("Case", learner.case || "-");
-    this.put("Score", learner.score === null ? "-" : learner.score.toFixed(0));
+    this.put("case", told(learner.case) || "-");
+    this.put("score", learner.score === null ? "-" : learner.score.toFixed(0));
   }
 
   close(): void {
@@ -108,7 +110,7 @@ class Card {
     socket.onopen = () => (this.retry_ms = 500);
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
     socket.onclose = () => {
-      this.put("Force", "-");
+      this.put("force", "-");
       window.setTimeout(() => this.listen(), this.retry_ms);
       this.retry_ms = Math.min(8000, 2 * this.retry_ms);
     };
@@ -120,19 +122,19 @@ class Card {
       if (new DataView(data).getUint16(6, true) === FRAME) this.show(decode(data) as Frame);
       return;
     }
-    const message = JSON.parse(data) as TextMessage;
+    const message = translated(JSON.parse(data) as TextMessage);
     if (message.type === "exam") this.exam = message;
     if (message.type === "controls") this.holder = message.holder ?? "";
-    this.put("Step", this.exam?.step.text || "-");
-    this.put("Done", progressOf(this.exam) || "-");
-    this.put("Control", this.holder || "-");
-    this.values.get("Control")!.className = this.holder === "teacher" ? "warn" : "";
+    this.put("step", this.exam?.step.text || "-");
+    this.put("progress", progressOf(this.exam) || "-");
+    this.put("control", this.holder || "-");
+    this.values.get("control")!.className = this.holder === "teacher" ? "warn" : "";
   }
 
   private show(frame: Frame): void {
     const { width, height, pixels, snapshot } = frame;
     window.setTimeout(() => this.send({ type: "ack", frame: frame.sequence }), ACK_MS);
-    this.put("Force", `${Math.max(0, snapshot.force_normal_n).toFixed(1)} N`);
+    this.put("force", `${shown(Math.max(0, snapshot.force_normal_n), 1)} N`);
     if (!width || !height) return;
     Object.assign(this.canvas, { width, height });
     const context = this.canvas.getContext("2d")!;
@@ -147,7 +149,7 @@ class Card {
   private say(): void {
     const text = this.comment.value.trim();
     if (!text) return;
-    this.send({ type: "comment", time_s: 0, text, author: "Teacher" });
+    this.send({ type: "comment", time_s: 0, text, author: t("class.teacher") });
     this.comment.value = "";
   }
 
@@ -164,7 +166,7 @@ export function openBoard(room: HTMLElement, secret: string): void {
   const wrong = make("span", "warn");
   const board = make("div", "board");
   const results = make("div", "results");
-  const nobody = make("p", "empty muted", "Nobody has joined yet.");
+  const nobody = make("p", "empty muted", t("class.nobody"));
   const tabs = make("div", "tabs");
   tabs.setAttribute("role", "tablist");
   const show = (which: HTMLElement): void => {
@@ -172,20 +174,20 @@ export function openBoard(room: HTMLElement, secret: string): void {
     for (const tab of tabs.children) tab.setAttribute("aria-selected", String(tab.id === (which === board ? "tab-board" : "tab-results")));
     if (which === results) void showResults(results, secret);
   };
-  for (const [id, text, view] of [["tab-board", "Learners", board], ["tab-results", "Results", results]] as const) {
+  for (const [id, text, view] of [["tab-board", t("class.learners"), board], ["tab-results", t("class.results"), results]] as const) {
     const tab = button(text, () => show(view));
     tab.id = id;
     tab.setAttribute("role", "tab");
     tabs.append(tab);
   }
-  top.append(make("h1", "", "Class"), tabs, make("span", "spring"), where, code, wrong);
+  top.append(make("h1", "", t("class.title")), tabs, make("span", "spring"), where, code, wrong);
   room.replaceChildren(top, nobody, board, results);
   show(board);
 
   const update = (news: ClassNews): void => {
-    where.textContent = `Join at ${news.address}`;
+    where.textContent = t("class.join_at", { address: news.address });
     code.textContent = news.code;
-    wrong.textContent = news.wrong ? `${news.wrong} wrong codes` : "";
+    wrong.textContent = news.wrong ? t("class.wrong", { n: news.wrong }) : "";
     nobody.hidden = news.learners.length > 0 || board.hidden;
     for (const learner of news.learners) {
       const card = cards.get(learner.place) ?? new Card(learner);
@@ -199,15 +201,15 @@ export function openBoard(room: HTMLElement, secret: string): void {
       const answer = await fetch("class.json", { headers: { Authorization: `Bearer ${secret}` }, cache: "no-store" });
       if (answer.status === 401) {
         for (const card of cards.values()) card.close();
-        nobody.textContent = "This address is not the teacher's of this class: open the one that the program printed.";
+        nobody.textContent = t("class.not_teacher");
         return;
       }
       update((await answer.json()) as ClassNews);
       find("live").textContent = "";
       top.classList.remove("lost");
     } catch {
-      find("live").textContent = "The class does not answer";
-      code.textContent = "The class does not answer";
+      find("live").textContent = t("class.silent");
+      code.textContent = t("class.silent");
     }
     window.setTimeout(() => void ask(), NEWS_MS);
   };

@@ -1,6 +1,7 @@
 // Joining a class: name and code, then the own page on the learner's place.
 
 import { announce, make, recall, remember } from "./dom";
+import { t } from "./words/language";
 
 interface Place {
   place: number;
@@ -29,7 +30,7 @@ const status = async (at: Place): Promise<number> => {
 
 /** Goes to a place as soon as its program answers. */
 async function enter(at: Place, say: (sentence: string) => void): Promise<void> {
-  say("Your program is starting");
+  say(t("class.starting"));
   while ((await status(at)) !== 200) await new Promise((done) => setTimeout(done, 500));
   location.assign(addressOf(at));
 }
@@ -52,20 +53,20 @@ export function openJoin(room: HTMLElement): void {
     form.append(box);
     return input;
   };
-  form.append(make("h1", "", "Join the class"));
+  form.append(make("h1", "", t("class.join_title")));
   const roles = make("fieldset");
-  roles.append(choice("learner", "I examine", true), choice("watcher", "I watch somebody", false));
+  roles.append(choice("learner", t("class.examine"), true), choice("watcher", t("class.watch"), false));
   form.append(roles);
-  const name = field("name", "Your name", { maxLength: 40, value: recall("trainee") });
-  const code = field("code", "Code of the class", { maxLength: 12, spellcheck: false });
-  const go = make("button", "primary", "Join");
+  const name = field("name", t("class.your_name"), { maxLength: 40, value: recall("trainee") });
+  const code = field("code", t("class.code"), { maxLength: 12, spellcheck: false });
+  const go = make("button", "primary", t("class.join"));
   const said = make("p", "warn");
   said.id = "said";
   said.setAttribute("role", "status");
   form.append(go, said);
   const back = known();
   if (back) {
-    const again = make("button", "", "Back to my place");
+    const again = make("button", "", t("class.back"));
     again.type = "button";
     again.hidden = true;
     again.onclick = () => void enter(back, say);
@@ -74,7 +75,7 @@ export function openJoin(room: HTMLElement): void {
   }
   room.replaceChildren(form);
   const watches = (): boolean => form.querySelector<HTMLInputElement>("input[value=watcher]")!.checked;
-  roles.onchange = () => (name.previousSibling!.textContent = watches() ? "Whom you watch" : "Your name");
+  roles.onchange = () => (name.previousSibling!.textContent = watches() ? t("class.whom") : t("class.your_name"));
   const say = (sentence: string): void => {
     said.textContent = sentence;
     announce(sentence);
@@ -85,7 +86,7 @@ export function openJoin(room: HTMLElement): void {
   };
   async function join(): Promise<void> {
     go.disabled = true;
-    say("Asking");
+    say(t("class.asking"));
     const role = watches() ? "watcher" : "learner";
     try {
       const answer = await fetch(`join?name=${encodeURIComponent(name.value.trim())}&role=${role}`, { headers: { Authorization: `Bearer ${code.value.trim()}` }, cache: "no-store" });
@@ -97,7 +98,7 @@ export function openJoin(room: HTMLElement): void {
       }
       await enter(at, say);
     } catch {
-      say("The class does not answer; try again");
+      say(t("class.silent_retry"));
     } finally {
       go.disabled = false;
     }

@@ -1,6 +1,7 @@
 // The results of a class: learners, cases with their difficulty, learning curves, and files to keep.
 
 import { button, draw, make, minutes } from "./dom";
+import { t, told } from "./words/language";
 
 export interface ResultEntry {
   id: string;
@@ -54,7 +55,7 @@ export function itemsOf(list: ResultEntry[]): Item[] {
       const other = own.filter((e) => means.get(e.trainee)! <= middle).map((e) => e.score);
       return {
         id,
-        title: own[0]!.title,
+        title: told(own[0]!.title),
         exams: own.length,
         learners: new Set(own.map((e) => e.trainee)).size,
         score: mean(own.map((e) => e.score)),
@@ -115,13 +116,13 @@ export async function showResults(room: HTMLElement, secret: string): Promise<vo
   try {
     list = ((await (await fetched("results.json")).json()) as { exams?: ResultEntry[] }).exams ?? [];
   } catch {
-    room.replaceChildren(make("p", "empty warn", "The results cannot be read now."));
+    room.replaceChildren(make("p", "empty warn", t("class.unread")));
     return;
   }
   const files = make("div");
-  files.append(button("Save as CSV", () => void save("results.csv")), " ", button("Save xAPI statements", () => void save("statements.jsonl")));
+  files.append(button(t("class.save_csv"), () => void save("results.csv")), " ", button(t("class.save_xapi"), () => void save("statements.jsonl")));
   if (!list.length) {
-    room.replaceChildren(make("p", "empty muted", "No exam is finished yet."), files);
+    room.replaceChildren(make("p", "empty muted", t("class.no_exam")), files);
     return;
   }
   list.sort((a, b) => a.date.localeCompare(b.date));
@@ -130,10 +131,10 @@ export async function showResults(room: HTMLElement, secret: string): Promise<vo
   curves.append(...learners.map(([name, own]) => curve(name, own)));
   const round = (v: number, digits = 0): number => (Number.isNaN(v) ? NaN : Number(v.toFixed(digits)));
   room.replaceChildren(
-    part("Learners", table(["Learner", "Exams", "Passed", "Right", "Mean", "Best", "Last"], learners.map(([name, own]) => [name, own.length, own.filter((e) => e.passed).length, own.filter((e) => e.correct).length, round(mean(own.map((e) => e.score))), round(Math.max(...own.map((e) => e.score))), own[own.length - 1]!.date.slice(0, 10)]))),
-    part("Cases, hardest first", table(["Case", "Exams", "Learners", "Mean", "Passed", "Difficulty", "Discrimination"], itemsOf(list).map((i) => [i.title, i.exams, i.learners, round(i.score), i.passed, round(i.difficulty, 2), round(i.discrimination)])), make("p", "muted", "Difficulty: share of exams with a wrong diagnosis. Discrimination: mean score of the better half of the learners less that of the others.")),
-    part("Learning curves", make("p", "muted", "Each exam's score, and the median of the last five."), curves),
-    part("Exams", table(["Date", "Learner", "Case", "Score", "Time"], [...list].reverse().slice(0, 200).map((e) => [e.date.replace("T", " ").replace("Z", ""), e.trainee, e.title, round(e.score), minutes(e.seconds)]))),
-    part("Files", files),
+    part(t("class.learners"), table([t("class.learner"), t("class.exams"), t("class.passed"), t("class.right"), t("class.mean"), t("class.best"), t("class.last")], learners.map(([name, own]) => [name, own.length, own.filter((e) => e.passed).length, own.filter((e) => e.correct).length, round(mean(own.map((e) => e.score))), round(Math.max(...own.map((e) => e.score))), own[own.length - 1]!.date.slice(0, 10)]))),
+    part(t("class.cases"), table([t("class.case"), t("class.exams"), t("class.learners"), t("class.mean"), t("class.passed"), t("class.difficulty"), t("class.discrimination")], itemsOf(list).map((i) => [i.title, i.exams, i.learners, round(i.score), i.passed, round(i.difficulty, 2), round(i.discrimination)])), make("p", "muted", t("class.items_note"))),
+    part(t("class.curves"), make("p", "muted", t("class.curves_note")), curves),
+    part(t("class.exams"), table([t("class.date"), t("class.learner"), t("class.case"), t("class.score"), t("class.time")], [...list].reverse().slice(0, 200).map((e) => [e.date.replace("T", " ").replace("Z", ""), e.trainee, told(e.title), round(e.score), minutes(e.seconds)]))),
+    part(t("class.files"), files),
   );
 }

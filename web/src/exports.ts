@@ -118,7 +118,7 @@ export class ExportDialog {
     const list = make("ul", "files");
     for (const file of this.message?.files ?? []) {
       const link = make("a", "", file.name);
-      Object.assign(link, { href: file.link, download: `${this.exam!.id}-${file.name.replace(/^export-/, "")}` });
+      Object.assign(link, { href: `.${file.link}`, download: `${this.exam!.id}-${file.name.replace(/^export-/, "")}` });
       const item = make("li");
       item.append(link);
       list.append(item);
