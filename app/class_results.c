@@ -5,34 +5,6 @@
 #include <stdio.h>
 #include <sys/stat.h>
 
-static void put_exam(sonde_json_out *out, const sonde_log_entry *e) {
-  sonde_json_begin_object(out, NULL);
-  sonde_json_put_text(out, "id", e->id);
-  sonde_json_put_text(out, "trainee", e->trainee);
-  sonde_json_put_text(out, "case", e->case_id);
-  sonde_json_put_text(out, "title", e->case_title);
-  sonde_json_put_text(out, "protocol", e->protocol);
-  sonde_json_put_text(out, "guidance", e->guidance);
-  sonde_json_put_text(out, "date", e->date);
-  sonde_json_put_real(out, "score", e->score, 6);
-  sonde_json_put_bool(out, "passed", e->passed);
-  sonde_json_put_bool(out, "correct", e->correct);
-  sonde_json_put_real(out, "seconds", e->metrics.time_s, 6);
-  sonde_json_put_integer(out, "hints", e->metrics.hints);
-  sonde_json_end(out);
-}
-
-static void put_row(sonde_file *file, const sonde_log_entry *e) {
-  const char *const texts[] = {e->date,       e->trainee,  e->case_id,
-                               e->case_title, e->protocol, e->guidance};
-  for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
-    sonde_csv_put_text(file, texts[i]);
-    sonde_file_printf(file, ",");
-  }
-  sonde_file_printf(file, "%.1f,%d,%d,%.1f,%u\r\n", e->score, e->passed, e->correct,
-                    e->metrics.time_s, (unsigned)e->metrics.hints);
-}
-
 static void publish(sonde_door *door, sonde_door_text which, sonde_file *file) {
   char *text = NULL;
   size_t size;
@@ -46,7 +18,8 @@ void class_results_tell(class_results *results, const char *home, sonde_door *do
   sonde_exam_log *log = NULL;
   sonde_log_entry *entries = NULL;
   uint32_t count = 0;
-  assert(results->log[0] && home[0]);
+  assert(results->log[0]);
+  assert(home[0] && door);
   if (stat(results->log, &about)) return; // no exam yet
   const long long changed_ns = 1000000000LL * about.st_mtim.tv_sec + about.st_mtim.tv_nsec;
   if (changed_ns == results->seen_ns) return;
@@ -68,8 +41,29 @@ void class_results_tell(class_results *results, const char *home, sonde_door *do
       sonde_door_statement(&entries[i], home, &one);
       sonde_file_printf(one.file, "\n");
       if (entries[i].interrupted) continue; // neither score nor answer
-      put_exam(&list, &entries[i]);
-      put_row(table, &entries[i]);
+      const sonde_log_entry *e = &entries[i];
+      sonde_json_begin_object(&list, NULL);
+      sonde_json_put_text(&list, "id", e->id);
+      sonde_json_put_text(&list, "trainee", e->trainee);
+      sonde_json_put_text(&list, "case", e->case_id);
+      sonde_json_put_text(&list, "title", e->case_title);
+      sonde_json_put_text(&list, "protocol", e->protocol);
+      sonde_json_put_text(&list, "guidance", e->guidance);
+      sonde_json_put_text(&list, "date", e->date);
+      sonde_json_put_real(&list, "score", e->score, 6);
+      sonde_json_put_bool(&list, "passed", e->passed);
+      sonde_json_put_bool(&list, "correct", e->correct);
+      sonde_json_put_real(&list, "seconds", e->metrics.time_s, 6);
+      sonde_json_put_integer(&list, "hints", e->metrics.hints);
+      sonde_json_end(&list);
+      const char *const texts[] = {e->date,       e->trainee,  e->case_id,
+                                   e->case_title, e->protocol, e->guidance};
+      for (size_t k = 0; k < sizeof texts / sizeof texts[0]; ++k) {
+        sonde_csv_put_text(table, texts[k]);
+        sonde_file_printf(table, ",");
+      }
+      sonde_file_printf(table, "%.1f,%d,%d,%.1f,%u\r\n", e->score, e->passed, e->correct,
+                        e->metrics.time_s, (unsigned)e->metrics.hints);
     }
     sonde_json_end(&list);
     sonde_json_end(&list);

@@ -146,10 +146,9 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
   if (!status) status = sonde_flow_start(&blood, &flow, error);
   if (!status) sonde_flow_scene_run(scene, &flow, of->at_s);
   sonde_colour_cell *cells = calloc(SONDE_COLOUR_CELLS, sizeof *cells);
-  uint8_t *pixels = malloc((size_t)image->width * image->height);
-  uint8_t *scratch = malloc((size_t)image->width * image->height);
-  if (!status && !(cells && pixels && scratch))
-    status = app_error(error, SONDE_MEMORY, "out of memory");
+  const size_t area = (size_t)image->width * image->height;
+  uint8_t *pixels = malloc(2 * area); // the picture, and as much to paint on
+  if (!status && !(cells && pixels)) status = app_error(error, SONDE_MEMORY, "out of memory");
   const double margin = 1e-3;
   const bool given = !isnan(of->box_m[0]);
   sonde_colour_box box = {given ? of->box_m[0] : -0.5 * aperture_m + margin,
@@ -191,7 +190,7 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
       if (k == 1) from = clock();
       sonde_flow_scene_cells(scene, echo, &box, cells);
       value = sonde_colour_frame(colour, cells);
-      paint(of, &box, colour, image, scratch, pixels);
+      paint(of, &box, colour, image, pixels + area, pixels);
     }
     result->frame_s = (double)(clock() - from) / CLOCKS_PER_SEC / FRAMES;
     compare(cells, value, result);
@@ -205,7 +204,7 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
       result->mean_m_s[v] = sonde_flow_scene_velocity(scene, v, s->pose);
     if (!status && of->cells) status = write_cells(of->cells, s, &box, cells, value, error);
   }
-  free(cells), free(pixels), free(scratch);
+  free(cells), free(pixels);
   sonde_colour_destroy(colour);
   sonde_flow_scene_destroy(scene);
   return status;

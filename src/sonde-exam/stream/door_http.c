@@ -96,15 +96,6 @@ void door_admit(sonde_door *door, door_connection *c) {
 
 // ---- going on to a learner's program
 
-// A browser's page says where it is from: only the door's own may open a WebSocket.
-static bool from_here(const page_request *request) {
-  static const char SCHEME[] = "https://";
-  const char *origin = request->field[PAGE_ORIGIN];
-  return !request->given[PAGE_ORIGIN] ||
-         (strncmp(origin, SCHEME, sizeof SCHEME - 1) == 0 && request->field[PAGE_HOST][0] &&
-          strcasecmp(origin + sizeof SCHEME - 1, request->field[PAGE_HOST]) == 0);
-}
-
 static void pass_on(sonde_door *door, door_connection *c, const page_request *request, size_t size,
                     unsigned long place, const char *path) {
   static const char *const FIELDS[PAGE_FIELDS] = {[PAGE_UPGRADE] = "Connection: Upgrade\r\nUpgrade",
@@ -122,7 +113,11 @@ static void pass_on(sonde_door *door, door_connection *c, const page_request *re
                        request->field[i]);
   used += snprintf(head + used, sizeof head - (size_t)used, "\r\n");
   SONDE_ASSERT((size_t)used < sizeof head && size >= 4 && size <= c->in->to);
-  if (!from_here(request)) {
+  // A browser's page says where it is from: only the door's own may open a WebSocket.
+  static const char SCHEME[] = "https://";
+  const char *origin = request->field[PAGE_ORIGIN], *host = request->field[PAGE_HOST];
+  if (request->given[PAGE_ORIGIN] && (strncmp(origin, SCHEME, sizeof SCHEME - 1) != 0 || !host[0] ||
+                                      strcasecmp(origin + sizeof SCHEME - 1, host) != 0)) {
     door_refuse(c, 403, "only this class's own pages may connect\n");
   } else if (!door_reach(c, (uint16_t)port)) {
     door_refuse(c, 502, "the learner's program is not there yet\n");
