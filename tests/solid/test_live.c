@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
+#include <stddef.h>
 #include <string.h>
 
 typedef struct rig {
@@ -134,7 +135,9 @@ static void forces_follow_from_poses_and_ticks(void **state) {
   for (worker kind = AS_LATE_AS_IT_MAY; kind <= ON_A_THREAD; ++kind) {
     run_script(kind, other, &counts[1]);
     assert_memory_equal(one, other, sizeof one);
-    assert_memory_equal(&counts[0], &counts[1], sizeof counts[0]);
+    // Bytes behind the last member are anything.
+    assert_memory_equal(&counts[0], &counts[1],
+                        offsetof(sonde_solid_live_counts, late) + sizeof counts[0].late);
   }
   assert_int_equal(counts[0].late, 0);
   assert_int_equal(counts[0].passes, 20);

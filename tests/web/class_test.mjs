@@ -229,8 +229,13 @@ async function main() {
   await handsOver(board, learner, errors);
   const release = await hold(room, 400);
   await pressAndRelease(learner, 8);
-  const exam = await learner.evaluate(() => ({ exam: window.sonde.exam.exam, presses: window.sonde.exam.presses.length }));
-  await says(board, "Done", `${exam.presses} presses`);
+  // Presses go on being counted while the probe comes to rest: until board and page say the same.
+  let exam, done;
+  do {
+    await pause(200);
+    exam = await learner.evaluate(() => ({ exam: window.sonde.exam.exam, presses: window.sonde.exam.presses.length }));
+    done = await dd(board, "Done").textContent();
+  } while (!done.includes(`, ${exam.presses} presses`));
   check(true, "strangers that hold every connection disturb neither");
   await learner.close();
   learner = await open(context, `https://${host}:${room.port}/`, errors); // a newcomer gets through as well
