@@ -78,7 +78,7 @@ static int make_leg(void **state) {
   if (!status) status = sonde_limb_model(&body, &def, &model, &error);
   if (!status) status = sonde_interior_create(model, &in, &error);
   if (status) fail_msg("%s", error.message);
-  return status;
+  return (int)status;
 }
 
 static int clear_leg(void **state) {

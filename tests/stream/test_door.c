@@ -44,7 +44,7 @@ static int open_door(void **state) {
                         .first_port = f->port,
                         .places = 2,
                         .join = note_join};
-  return sonde_door_open(&def, &at.door, NULL);
+  return (int)sonde_door_open(&def, &at.door, NULL);
 }
 
 static int close_door(void **state) {
