@@ -71,8 +71,8 @@ async function main() {
     const file = await download(page, `export-${part}.${ending}`);
     check(file.bytes.equals(readFileSync(own)), `part ${part} as ${ending}: the ${file.bytes.length} bytes of the command line`);
     check(file.called === `${id}-${part}.${ending}`, `it is called ${file.called}`);
-    const stranger = await fetch(at + file.link.split("?")[0]);
-    const other = await fetch(at + file.link.replace(/key=./, (key) => (key === "key=0" ? "key=1" : "key=0")));
+    const stranger = await fetch(new URL(file.link.split("?")[0], at));
+    const other = await fetch(new URL(file.link.replace(/key=./, (key) => (key === "key=0" ? "key=1" : "key=0")), at));
     check(stranger.status === 401 && other.status === 401, "but not without its key");
     check(exported(directory).length === 1, "one export is kept");
   }
@@ -81,9 +81,9 @@ async function main() {
   check(names.includes("worksheet.dcm") && names.includes("worksheet-1.dcm"), `the worksheet has ${names.join(", ")}`);
   for (const name of names) {
     const link = await page.locator("#export .files a", { hasText: new RegExp(`^${name.replaceAll(".", "\\.")}$`) }).getAttribute("href");
-    const bytes = Buffer.from(await (await fetch(at + link)).arrayBuffer());
+    const bytes = Buffer.from(await (await fetch(new URL(link, at))).arrayBuffer());
     check(bytes.equals(readFileSync(join(directory, name))), `${name} is that of the exam`);
-    check((await fetch(at + link.split("?")[0])).status === 401, "and not for everyone");
+    check((await fetch(new URL(link.split("?")[0], at))).status === 401, "and not for everyone");
   }
   // Cancelled, or over before that: there is no file of a part, and the next export is taken.
   await page.locator("#export select").selectOption("2");
