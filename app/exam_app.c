@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static const double TELL_EVERY_S = 0.2;
 
@@ -96,7 +97,8 @@ void exam_app_change(exam_app *app, exam *next, exam_replay *replay) {
   pthread_mutex_unlock(&app->lock);
   app->replay = replay;
   exam_film_destroy(app->film);
-  app->film = NULL;
+  exam_draft_destroy(app->draft);
+  app->film = NULL, app->draft = NULL;
   exam_destroy(exam_before);
   exam_replay_destroy(replay_before);
 }
@@ -166,6 +168,7 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
   }
   case SONDE_PAGE_WORKSHEET: return exam_app_write_sheet(app, request->entry, error);
   case SONDE_PAGE_EXPORT: return exam_export_ask(app, request, error);
+  case SONDE_PAGE_EDIT: return exam_edit(app, request->entry, error);
   case SONDE_PAGE_POSITION: return exam_turn(app, request->id, error);
   case SONDE_PAGE_FINISH_EXAM: return exam_finish(app, error);
   case SONDE_PAGE_LEAVE_EXAM: return exam_app_practice(app, error);
@@ -221,6 +224,32 @@ void exam_app_turn(exam_app *app) {
 
 // ---- the application
 
+sonde_status exam_app_load_cases(exam_app *app, sonde_error *error) {
+  sonde_case *ship = NULL, *own = NULL;
+  uint32_t count = 0, more = 0;
+  sonde_error wrong = {0};
+  sonde_status status = sonde_case_list(app->cases, &ship, &count, error);
+  if (status) return status;
+  // Own cases that cannot be read are no reason to stay without the others.
+  if (access(app->own_cases, F_OK) == 0 && sonde_case_list(app->own_cases, &own, &more, &wrong))
+    fprintf(stderr, "sonde run: the cases in %s are left out: %s\n", app->own_cases, wrong.message);
+  sonde_case *all = calloc(count + more + 1, sizeof *all);
+  if (all) {
+    memcpy(all, ship, count * sizeof *all);
+    app->shipped_count = app->case_count = count;
+    for (uint32_t i = 0; i < more; ++i) {
+      bool known = false;
+      for (uint32_t k = 0; k < count; ++k) known |= strcmp(ship[k].id, own[i].id) == 0;
+      if (!known) all[app->case_count++] = own[i];
+    }
+    free(app->case_list);
+    app->case_list = all;
+  }
+  sonde_free(ship);
+  sonde_free(own);
+  return all ? SONDE_OK : app_error(error, SONDE_MEMORY, "out of memory");
+}
+
 sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_error *error) {
   assert(def->cases && def->protocols);
   exam_app *app = calloc(1, sizeof *app);
@@ -229,12 +258,13 @@ sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_erro
   app->def = *def;
   pthread_mutex_init(&app->lock, NULL);
   snprintf(app->cases, sizeof app->cases, "%s", def->cases);
+  snprintf(app->own_cases, sizeof app->own_cases, "%s", def->own_cases);
   snprintf(app->protocols, sizeof app->protocols, "%s", def->protocols);
   snprintf(app->exams, sizeof app->exams, "%s", def->exams);
   snprintf(app->trainee, sizeof app->trainee, "%s", def->trainee);
   // Cases, protocols, the log, and the probes that a replay shows.
   char path[EXAM_PATH];
-  sonde_status status = sonde_case_list(app->cases, &app->case_list, &app->case_count, error);
+  sonde_status status = exam_app_load_cases(app, error);
   if (!status)
     status =
         sonde_exam_protocol_list(app->protocols, &app->protocol_list, &app->protocol_count, error);
@@ -312,11 +342,12 @@ sonde_status exam_app_destroy(exam_app *app, sonde_error *error) {
   exam_destroy(app->exam);
   exam_replay_destroy(app->replay);
   exam_film_destroy(app->film);
+  exam_draft_destroy(app->draft);
   sonde_course_clear(&app->course);
   sonde_exam_log_close(app->log);
   for (uint32_t i = 0; i < app->probe_count; ++i) sonde_probe_clear(&app->probes[i]);
   free(app->probes);
-  sonde_free(app->case_list);
+  free(app->case_list);
   sonde_free(app->protocol_list);
   pthread_mutex_destroy(&app->lock);
   free(app);

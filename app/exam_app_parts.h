@@ -27,7 +27,8 @@ typedef enum exam_phase {
   EXAM_RUNNING,
   EXAM_DONE,
   EXAM_REPLAY,
-  EXAM_FILM
+  EXAM_FILM,
+  EXAM_EDIT
 } exam_phase;
 
 // Picture at half the image's size; the vein's ratio in it.
@@ -115,11 +116,21 @@ typedef struct exam_replay {
   uint64_t shown_tick;
 } exam_replay;
 
+// A case that a teacher edits: what the page is told of its text.
+typedef struct exam_draft {
+  sonde_case_setup setup; // whose leg is in view; without a model: none
+  uint32_t serial;        // of the message that is answered
+  bool good, exists;      // it can be examined; another of its id would be replaced
+  char message[512], saved[EXAM_PATH];
+  char *text;  // of the case that was opened, freed by sonde_free(); NULL: the page has it
+  char *right; // text of the case in view, that was found to be right; free()
+} exam_draft;
+
 struct exam_app {
   exam_app_def def;
-  char cases[EXAM_PATH], protocols[EXAM_PATH], exams[EXAM_PATH], trainee[164];
-  sonde_case *case_list;
-  uint32_t case_count;
+  char cases[EXAM_PATH], own_cases[EXAM_PATH], protocols[EXAM_PATH], exams[EXAM_PATH], trainee[164];
+  sonde_case *case_list; // [case_count] those that ship, then the user's own
+  uint32_t case_count, shipped_count;
   sonde_exam_protocol *protocol_list;
   uint32_t protocol_count;
   sonde_probe *probes; // [probe_count] that a replay shows
@@ -129,10 +140,12 @@ struct exam_app {
   sonde_session *session; // practice or exam; NULL in a replay
   exam_phase phase;       // under the lock when changed
   char message[EXAM_SENTENCE];
-  exam *exam;          // NULL: none
-  exam_replay *replay; // NULL: none
-  exam_film *film;     // NULL: none
-  exam_export *export; // NULL: none
+  exam *exam;              // NULL: none
+  exam_replay *replay;     // NULL: none
+  exam_film *film;         // NULL: none
+  exam_export *export;     // NULL: none
+  exam_draft *draft;       // NULL: none
+  const sonde_case *trial; // that the next exam is about, whatever the page says; NULL: none
   sonde_course course;
   double published_s;
   bool disk_told; // that the disk does not take the recording
@@ -162,11 +175,15 @@ void exam_app_set_phase(exam_app *app, exam_phase phase, const char *message);
 // empty for a case that is not in the library.
 void exam_app_case_alias(const exam_app *app, const char *id, char alias[EXAM_ALIAS]);
 
+// Reads those that ship and the user's own again.
+sonde_status exam_app_load_cases(exam_app *app, sonde_error *error);
+
 // exam_app_messages.c: what the page is told.
 void exam_app_tell_greeting(exam_app *app);
 void exam_app_tell_exam(exam_app *app);
 void exam_app_tell_exams(exam_app *app);
 void exam_app_tell_replay(exam_app *app);
+void exam_app_tell_draft(exam_app *app);
 
 // exam_app_parts.c: parts of an exam's recording, counted from 1.
 const char *exam_part_path(char path[EXAM_PATH], const char *directory, uint32_t part);
@@ -192,6 +209,20 @@ sonde_status exam_finish(exam_app *app, sonde_error *error);
 void exam_score(exam *of);
 // The session must be gone.
 void exam_destroy(exam *of);
+
+// exam_app_edit.c: the case editor.
+// One message of a teacher's page. What is wrong with the case is told in the draft, not returned.
+sonde_status exam_edit(exam_app *app, const char *entry, sonde_error *error);
+
+// exam_app_draft.c: its draft.
+// Reads the text and builds the case. A leg whose findings or truth are wrong is shown
+// nevertheless.
+sonde_status exam_draft_check(exam_app *app, const char *text, sonde_case *out, sonde_error *error);
+// Writes it among the user's own cases, under its id, which the reader has found to be a plain
+// name.
+sonde_status exam_draft_keep(exam_app *app, const sonde_case *c, bool replace, sonde_error *error);
+// The page must show something else by then.
+void exam_draft_destroy(exam_draft *draft);
 
 // exam_app_sheet.c: the worksheet.
 // Means of 2 x 2 pixels. @param image of half the frame's width and height

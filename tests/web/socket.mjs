@@ -7,7 +7,7 @@ const FRAME = 3;
 function masked(text) {
   const data = Buffer.from(text);
   const mask = randomBytes(4);
-  const body = data.map((byte, i) => byte ^ mask[i % 4]);
+  const body = data.map((byte, i) => byte ^ mask[i % 4]); // shorter than 126 bytes
   return Buffer.concat([Buffer.from([0x81, 0x80 | data.length]), mask, body]);
 }
 
@@ -70,6 +70,11 @@ export class Client {
     this.sequences.push(sequence);
     this.socket.write(masked(JSON.stringify({ type: "ack", frame: sequence })));
     this.woken?.();
+  }
+
+  /** A message to the program, shorter than 126 bytes. */
+  say(message) {
+    this.socket.write(masked(JSON.stringify(message)));
   }
 
   /** Resolves once so many more frames have come. */
