@@ -98,9 +98,12 @@ static const app_option TABLE[] = {
     OPT_REAL(colour.scale_m_s, "scale-cm-s", "V", 1, 300, 1e-2,
              "velocity along the beam from which colour folds; default above the fastest blood"),
     OPT_REAL(colour.steer_rad, "steer-deg", "A", -25, 25, 3.14159265358979323846 / 180,
-             "of the colour's beam to the right; default 0 or 20, as the vessels need it"),
-    OPT_NUMBERS(colour.box_m, "box", "LEFT:RIGHT,TOP:BOTTOM", -300, 300,
-                "where the colour is, mm; default the whole picture"),
+             "of the colour's beam to the right, of a flat face; default 0 or 20, as the vessels "
+             "need it"),
+    OPT_NUMBERS(
+        colour.box_m, "box", "LEFT:RIGHT,TOP:BOTTOM", -300, 300,
+        "where the colour is, mm, of a curved face along its arc and its lines; default the "
+        "whole picture"),
     OPT_REAL(colour.at_s, "at-s", "T", 0, 60, 1, "time since the heart's first beat; default 3"),
     OPT_REAL(colour.squeeze_s, "squeeze-s", "T", 0, 60, 1, "a hand squeezes the calf at T"),
     OPT_OUTPUT(colour.cells, "cells", "CSV", "write true and shown velocity of each cell"),
@@ -165,8 +168,6 @@ static int check(void *from) {
   for (int k = 0; k < 4 && !isnan(box[0]); ++k) box[k] *= 1e-3;
   if (!isnan(box[0]) && !(box[0] < box[1] && box[2] >= 0 && box[2] < box[3]))
     return app_usage_error("image", "--box expects LEFT < RIGHT and 0 <= TOP < BOTTOM");
-  if (o->colour.on && o->radius_m > 0)
-    return app_usage_error("image", "--colour needs a flat face, not --curved-mm");
   return APP_OK;
 }
 
@@ -286,6 +287,11 @@ static int run(void *from) {
     status =
         app_error(&error, SONDE_ARGUMENT,
                   "--strain expects a flat face, this one has a radius of %g mm", 1e3 * radius);
+  if (!status && !isnan(o->colour.steer_rad) && radius > 0)
+    status = app_error(&error, SONDE_ARGUMENT,
+                       "--steer-deg expects a flat face, the lines of this one with a radius of %g "
+                       "mm are a fan",
+                       1e3 * radius);
   if (!status) status = sonde_echo_create(d.s.interior, &def, &d.echo, &error);
   if (!status) status = sonde_echo_set_radius(d.echo, radius, &error);
   if (!status)
@@ -297,8 +303,8 @@ static int run(void *from) {
       fprintf(stderr, "sonde image: %u pieces of tissue are missing in the picture\n", lost);
     status = !o->colour.on ? sonde_image_save_png(&d.image, o->out, &error)
                            : image_colour_draw(&o->colour, &d.s, d.echo, &d.image, d.aperture_m,
-                                               o->settings.frequency_hz, (uint64_t)o->seed, o->out,
-                                               &o->flow, &error);
+                                               radius, o->settings.frequency_hz, (uint64_t)o->seed,
+                                               o->out, &o->flow, &error);
   }
   if (!status && o->truth)
     status = image_truth_write(o->truth, d.echo, d.s.interior, &d.image, &error);

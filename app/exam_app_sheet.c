@@ -22,6 +22,7 @@ void exam_shrink(const sonde_frame *frame, sonde_image *image) {
     }
   image->width_m = frame->width_m;
   image->height_m = frame->height_m;
+  image->top_m = frame->top_m;
   image->tick = frame->snapshot.tick;
 }
 
@@ -55,7 +56,8 @@ static void copy_image(const sonde_image *from, sonde_image *to) {
     if (sonde_image_create(from->width, from->height, to, NULL)) return;
   }
   memcpy(to->pixels, from->pixels, (size_t)from->width * from->height);
-  to->width_m = from->width_m, to->height_m = from->height_m, to->tick = from->tick;
+  to->width_m = from->width_m, to->height_m = from->height_m;
+  to->top_m = from->top_m, to->tick = from->tick;
 }
 
 // What sonde_worksheet_enter() asks for.

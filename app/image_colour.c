@@ -49,26 +49,29 @@ static void paint(const image_colour *of, const sonde_colour_box *box, sonde_col
     }
 }
 
+// Whether the box holds a pixel's middle.
+static bool holds(const sonde_colour_box *box, const sonde_image *image, double column,
+                  double row) {
+  const double size = image->width_m / image->width, edge = 0.5 + 1e-9;
+  double at[2];
+  (void)sonde_colour_find(box, (column + 0.5 - 0.5 * image->width) * size,
+                          image->top_m + (row + 0.5) * size, at);
+  return at[0] >= -edge && at[0] <= SONDE_COLOUR_LINES - 1 + edge && at[1] >= -edge &&
+         at[1] <= SONDE_COLOUR_ROWS - 1 + edge;
+}
+
 // The bar at the right edge, and the box's outline.
 static void draw_frame(const image_colour *of, const sonde_colour_box *box, double limit,
                        const sonde_image *image, uint8_t *pixels) {
   const uint32_t width = image->width, height = image->height, top = height / 16 + 12,
                  length = height / 3;
-  const double size = image->width_m / width, lean = tan(box->steer_rad);
-  const double corner[5][2] = {{box->left_m, box->top_m},
-                               {box->right_m, box->top_m},
-                               {box->right_m, box->bottom_m},
-                               {box->left_m, box->bottom_m},
-                               {box->left_m, box->top_m}};
-  for (int k = 0; k < 4; ++k)
-    for (int n = 0; n < 4 * (int)(width + height); ++n) {
-      const double share = n / (4.0 * (width + height));
-      const double z = corner[k][1] + share * (corner[k + 1][1] - corner[k][1]);
-      const double x = corner[k][0] + share * (corner[k + 1][0] - corner[k][0]) + z * lean;
-      const double column = x / size + 0.5 * width, row = z / size;
-      if (column >= 0 && column < width && row >= 0 && row < height)
-        pixels[(size_t)row * width + (size_t)column] = GREYS - 30;
-    }
+  // Pixels in the box, some of whose neighbours are not.
+  for (uint32_t y = 0; y < height; ++y)
+    for (uint32_t x = 0; x < width; ++x)
+      if (holds(box, image, x, y) &&
+          !(holds(box, image, x - 1.0, y) && holds(box, image, x + 1.0, y) &&
+            holds(box, image, x, y - 1.0) && holds(box, image, x, y + 1.0)))
+        pixels[(size_t)y * width + x] = GREYS - 30;
   for (uint32_t y = 0; y < length && top + y < height; ++y)
     for (uint32_t x = 0; x < BAR && x + BAR + 4 < width; ++x)
       pixels[(size_t)(top + y) * width + width - 4 - BAR + x] =
@@ -127,9 +130,9 @@ static void compare(const sonde_colour_cell *cells, const sonde_colour_value *va
 }
 
 sonde_status image_colour_draw(const image_colour *of, const settled *s, const sonde_echo *echo,
-                               const sonde_image *image, double aperture_m, double frequency_hz,
-                               uint64_t seed, const char *path, image_colour_result *result,
-                               sonde_error *error) {
+                               const sonde_image *image, double aperture_m, double radius_m,
+                               double frequency_hz, uint64_t seed, const char *path,
+                               image_colour_result *result, sonde_error *error) {
   sonde_flow_scene *scene = NULL;
   sonde_colour *colour = NULL;
   // The network in the pressed vessels.
@@ -149,17 +152,20 @@ sonde_status image_colour_draw(const image_colour *of, const settled *s, const s
     status = app_error(error, SONDE_MEMORY, "out of memory");
   const double margin = 1e-3;
   const bool given = !isnan(of->box_m[0]);
-  sonde_colour_box box = {
-      given ? of->box_m[0] : -0.5 * aperture_m + margin,
-      given ? of->box_m[1] : 0.5 * aperture_m - margin, given ? of->box_m[2] : 2 * margin,
-      given ? of->box_m[3] : image->height_m - margin, isnan(of->steer_rad) ? 0 : of->steer_rad};
+  sonde_colour_box box = {given ? of->box_m[0] : -0.5 * aperture_m + margin,
+                          given ? of->box_m[1] : 0.5 * aperture_m - margin,
+                          given ? of->box_m[2] : 2 * margin,
+                          given ? of->box_m[3] : image->top_m + image->height_m - margin,
+                          isnan(of->steer_rad) ? 0 : of->steer_rad,
+                          radius_m};
   sonde_colour_def def = sonde_colour_def_default();
   def.frequency_hz = fmin(frequency_hz, 5e6), def.seed = seed, def.persistence = 0.5;
   if (!status) {
     // Steered by 20 degrees to the side on which the blood is faster along the beam.
     static const double TRY[] = {0, 0.349, -0.349};
     double best = -1, chosen = box.steer_rad;
-    for (size_t k = 0; k < sizeof TRY / sizeof *TRY && isnan(of->steer_rad); ++k) {
+    for (size_t k = 0; k < (radius_m > 0 ? 1 : sizeof TRY / sizeof *TRY) && isnan(of->steer_rad);
+         ++k) {
       double sum = 0;
       box.steer_rad = TRY[k];
       sonde_flow_scene_cells(scene, echo, &box, cells);

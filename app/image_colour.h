@@ -26,11 +26,12 @@ typedef struct image_colour_result {
   double mean_m_s[IMAGE_VESSELS];       // of the vessels, on their way
 } image_colour_result;
 
-// Draws the picture with its colour and a bar, and writes it; results to JSON or as text.
+// Draws the picture with its colour and a bar, and writes it; results to JSON or as text. Aperture
+// and radius (0: flat) are the face's.
 sonde_status image_colour_draw(const image_colour *of, const settled *s, const sonde_echo *echo,
-                               const sonde_image *image, double aperture_m, double frequency_hz,
-                               uint64_t seed, const char *path, image_colour_result *result,
-                               sonde_error *error);
+                               const sonde_image *image, double aperture_m, double radius_m,
+                               double frequency_hz, uint64_t seed, const char *path,
+                               image_colour_result *result, sonde_error *error);
 void image_colour_tell(const image_colour_result *result, const settled *s, bool json);
 
 #endif

@@ -101,8 +101,8 @@ static void draw_picture(output *o, const sonde_frame *frame) {
   // A mark for every centimetre of depth, at the right edge.
   enum { MARK = 7, EDGE = 26 };
   uint32_t left = frame->width > EDGE ? frame->width - EDGE : 0;
-  for (uint32_t cm = 1; cm * 0.01 < frame->height_m; ++cm) {
-    uint32_t y = (uint32_t)(cm * 0.01 / frame->height_m * frame->height);
+  for (uint32_t cm = 1; cm * 0.01 - frame->top_m < frame->height_m; ++cm) {
+    uint32_t y = (uint32_t)((cm * 0.01 - frame->top_m) / frame->height_m * frame->height);
     char text[12];
     memset(o->picture + (size_t)y * o->width + left, 170, frame->width > EDGE ? MARK : 0);
     snprintf(text, sizeof text, "%u", cm);
@@ -190,6 +190,7 @@ static sonde_status write_image(output *o, const sonde_frame *frame, sonde_error
                        .height = frame->height,
                        .width_m = frame->width_m,
                        .height_m = frame->height_m,
+                       .top_m = frame->top_m,
                        .pixels = (uint8_t *)(uintptr_t)frame->pixels};
   if (what->sequence) {
     sonde_status status = track(o, frame, &image, error);

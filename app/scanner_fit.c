@@ -57,7 +57,6 @@ static sonde_status judge(const scanner_fit *fit, bench *b, const sonde_scanner 
     sonde_echo_def def = sonde_echo_def_default();
     def.scanner = scanner, def.seed = m + 1;
     status = sonde_echo_create(s->interior, &def, &echo, error);
-    if (!status) status = sonde_echo_set_radius(echo, scanner->radius_m, error);
     for (uint32_t v = 0; v < fit->views && !status; ++v) {
       // Sites all along the leg; every other view turns along it.
       const uint32_t site = (v * s->model->site_count + m * s->model->site_count / fit->models) /

@@ -56,7 +56,6 @@ static sonde_status draw(scene *s, const sonde_scanner *scanner, uint32_t number
   def.seed = seed, def.scanner = scanner;
   sonde_echo *echo = NULL;
   sonde_status status = sonde_echo_create(s->interior, &def, &echo, error);
-  if (!status) status = sonde_echo_set_radius(echo, scanner->radius_m, error);
   const double aperture = scanner->aperture_m > 0 ? scanner->aperture_m : 2 * s->probe.half_x_m;
   if (!status)
     sonde_echo_render(echo, pose, aperture, &s->pathology, &scanner->settings, &s->image);

@@ -45,6 +45,8 @@ SONDE_API double sonde_echo_default_tgc_db_per_m(double frequency_hz);
 typedef struct sonde_image {
   uint32_t width, height;
   double width_m, height_m; /**< physical size of the picture; square pixels */
+  double top_m;             /**< z of its upper edge in the probe frame: 0 of a flat face; above the
+                                 middle of a curved one, whose outer lines start higher: negative */
   uint64_t tick;            /**< of the state it shows */
   uint8_t *pixels;          /**< [height*width] owned by the image */
 } sonde_image;
@@ -127,7 +129,8 @@ SONDE_API void sonde_echo_set_flow(sonde_echo *echo, const sonde_echo_flow *flow
  *  touches. @param coupling [line_count] copied @thread owner */
 SONDE_API void sonde_echo_set_coupling(sonde_echo *echo, const float *coupling);
 
-/** Radius of a curved face (m, 20 mm and more), its aperture measured along the arc; 0: flat.
+/** Radius of a curved face (m, 20 mm and more), its aperture measured along the arc; 0: flat. An
+ *  echo begins with its scanner's.
  *  @return SONDE_ARGUMENT @thread owner */
 SONDE_API sonde_status sonde_echo_set_radius(sonde_echo *echo, double radius_m, sonde_error *error);
 /** Whether a face can be drawn whole to every depth: an array of 5 to 200 mm, flat or on an arc of

@@ -201,6 +201,8 @@ struct sonde_frame {
   const uint8_t *pixels; /**< [height*width] */
   uint32_t width, height;
   double width_m, height_m;
+  double top_m;    /**< z of the picture's upper edge, as in sonde_image */
+  double radius_m; /**< of the scanner's curved face, 0: flat */
   sonde_frame_colour colour;
   sonde_gate_spectrum spectrum; /**< its columns belong to the frame */
 };

@@ -21,11 +21,14 @@ enum {
 };
 #define SONDE_COLOUR_NO_VESSEL UINT32_MAX
 
-/** Where the colour is: a box of the image plane whose sides lean with the beam. */
+/** Where the colour is: a box of the image plane whose sides lean with the beam; before a curved
+ *  face a sector between two lines of its fan. */
 typedef struct sonde_colour_box {
-  double left_m, right_m; /**< at the face, x of the probe frame */
-  double top_m, bottom_m; /**< depths */
-  double steer_rad;       /**< of the beam towards +x, -0.5 to 0.5 */
+  double left_m, right_m; /**< at the face, from its middle: x of the probe frame, of a curved face
+                               along the arc */
+  double top_m, bottom_m; /**< depths, of a curved face along the lines */
+  double steer_rad;       /**< of a flat face's beam towards +x, -0.5 to 0.5 */
+  double radius_m;        /**< of a curved face; 0: flat */
 } sonde_colour_box;
 /** Middle of a cell in the image plane: x and z of the probe frame, m. @thread any (tick) */
 SONDE_API void sonde_colour_place(const sonde_colour_box *box, uint32_t line, uint32_t row,
@@ -98,8 +101,8 @@ typedef struct sonde_colour_overlay {
                         over 25 dB */
 } sonde_colour_overlay;
 /**
- * The last frame over the picture of a flat face: bilinear between cells, velocities as phases, so
- * that folds stay sharp. Where the picture is brighter than 110 of 255 it has priority.
+ * The last frame over the picture: bilinear between cells, velocities as phases, so that folds stay
+ * sharp. Where the picture is brighter than 110 of 255 it has priority.
  * @param gain_db of the power before the threshold SONDE_COLOUR_POWER
  * @param power how much moves instead of how fast
  * @param[in,out] overlay pixels with room for all of the image; the rest is set
@@ -137,7 +140,8 @@ SONDE_API sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_sce
 SONDE_API void sonde_flow_scene_recall(sonde_flow_scene *scene,
                                        const sonde_flow_scene_memory *memory);
 /** What moves in the cells of a box now: lumina as the interior has them, at the places where the
- *  echo's last picture draws them.
+ *  echo's last picture draws them, velocities against the beam at each line.
+ *  @param box of the radius of the echo's face
  *  @param[out] cells [SONDE_COLOUR_CELLS] @thread owner; no allocation */
 SONDE_API void sonde_flow_scene_cells(const sonde_flow_scene *scene, const sonde_echo *echo,
                                       const sonde_colour_box *box, sonde_colour_cell *cells);

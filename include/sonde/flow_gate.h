@@ -21,10 +21,11 @@ enum { SONDE_GATE_COLUMNS = 64 };
 
 /** What an examiner sets; sonde_gate_clean() says the ranges. */
 typedef struct sonde_gate_settings {
-  double x_m,
-      z_m; /**< middle of the sample volume in the image plane, x of the probe frame; depth */
+  double x_m, z_m;  /**< middle of the sample volume in the image plane, x and z of the probe frame;
+                         before a curved face its line, along the arc from the face's middle, and
+                         its depth on that line */
   double length_m;  /**< of it along the beam */
-  double steer_rad; /**< lean of the beam towards +x */
+  double steer_rad; /**< lean of a flat face's beam towards +x; of a curved face's line nothing */
   double angle_rad; /**< from the beam to the cursor that lies along the vessel: kept, not used */
   double scale_m_s; /**< velocity along the beam from which it folds when the base line is in the
                          middle; less where pulses have a longer way to the gate and back */

@@ -2,6 +2,7 @@
 // faults fade the force.
 #include "../sanitized.h"
 #include "exam_test.h"
+#include "sonde/files_scanner.h"
 
 static int set_up(void **state) {
   *state = barrel_model();
@@ -386,6 +387,58 @@ static void creation_survives_lack_of_memory(void **state) {
   assert_int_not_equal(access("exam_memory.rec", F_OK), 0); // no tick, no file
 }
 
+// A scanner with a curved face: the picture is its fan from the first on, as wide and as high as
+// the fan, black beside it; colour and gate are on its lines, within them, and do not lean. A face
+// that spans too wide an arc is refused.
+#define NEAR(a, b) (fabs((a) - (b)) < 1e-12)
+static void a_curved_scanner_draws_its_fan(void **state) {
+  sonde_scanner scanner = sonde_scanner_plain();
+  scanner.radius_m = 0.06, scanner.aperture_m = 0.05;
+  sonde_session_def def = small_def(*state);
+  def.scanner = &scanner;
+  def.controls.duplex.shown = SONDE_DUPLEX_VELOCITY, def.controls.duplex.gated = true;
+  def.controls.duplex.box.right_m = 0.08, def.controls.duplex.box.steer_rad = 0.2;
+  def.controls.duplex.gate.x_m = 0.09, def.controls.duplex.gate.steer_rad = 0.2;
+  sonde_session *session = open_session(&def, press_device());
+  const double depth_m = def.controls.echo.depth_m, half_rad = 0.5 * 0.05 / 0.06;
+  sonde_frame frame = {0};
+  uint32_t bright = 0;
+  for (int image = 0; image < 15; ++image) {
+    for (uint32_t k = 0; k < def.ticks_per_image; ++k) sonde_session_tick(session);
+    assert_true(sonde_session_frame(session, &frame));
+    assert_true(NEAR(frame.top_m, 0.06 * (cos(half_rad) - 1)));
+    assert_true(NEAR(frame.height_m, depth_m - frame.top_m));
+    assert_true(NEAR(frame.radius_m, 0.06));
+    const double size = frame.width_m / frame.width;
+    for (uint32_t y = 0; y < frame.height; ++y)
+      for (uint32_t x = 0; x < frame.width; ++x) {
+        const double across = (x + 0.5 - 0.5 * frame.width) * size,
+                     down = frame.top_m + (y + 0.5) * size + 0.06;
+        const bool fan = fabs(atan2(across, down)) < half_rad + 0.02 &&
+                         hypot(across, down) > 0.06 - size &&
+                         hypot(across, down) < 0.06 + depth_m + size;
+        const uint8_t pixel = frame.pixels[y * frame.width + x];
+        if (!fan) assert_int_equal(pixel, 0);
+        bright += pixel > 30;
+      }
+  }
+  assert_true(bright > 1000);
+  const sonde_colour_box *box = &frame.colour.box;
+  assert_int_equal(frame.colour.shown, SONDE_DUPLEX_VELOCITY);
+  assert_true(box->radius_m == 0.06 && box->steer_rad == 0);
+  assert_true(NEAR(box->right_m, 0.025));
+  assert_true(frame.spectrum.on && frame.spectrum.settings.steer_rad == 0);
+  assert_true(NEAR(frame.spectrum.settings.x_m, 0.025));
+  close_session(session);
+
+  scanner.radius_m = 0.02;
+  sonde_device device = press_device();
+  sonde_error error;
+  assert_int_equal(sonde_session_create(&def, &device, &session, &error), SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "degrees"));
+  device.destroy(device.self);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(rejects_bad_definitions),
@@ -396,6 +449,7 @@ int main(void) {
       cmocka_unit_test(sessions_do_not_know_of_each_other),
       cmocka_unit_test(controls_are_cleaned),
       cmocka_unit_test(a_new_depth_comes_within_images),
+      cmocka_unit_test(a_curved_scanner_draws_its_fan),
       cmocka_unit_test(faults_fade_and_resume),
       cmocka_unit_test(rotations_are_made_unit),
       cmocka_unit_test(a_short_stop_is_not_missed),

@@ -66,6 +66,7 @@ static float f32_at(const unsigned char *b) {
 }
 
 static sonde_gate_spectrum heard; // of the next frame
+static double radius_m;           // likewise
 
 // A frame of two nodes and 2 x 1 pixels, of which colour covers the right one; the first node moved
 // by far too much.
@@ -79,8 +80,9 @@ static size_t make_frame(unsigned char *bytes, size_t capacity, bool colour) {
   uint8_t over[1] = {201};
   if (colour)
     frame.colour = (sonde_frame_colour){
-        SONDE_DUPLEX_VELOCITY, {-0.01, 0.012, 0.004, 0.03, 0.25}, 0.0625, {1, 0, 1, 1, over}};
+        SONDE_DUPLEX_VELOCITY, {-0.01, 0.012, 0.004, 0.03, 0.25, 0}, 0.0625, {1, 0, 1, 1, over}};
   frame.spectrum = heard;
+  frame.radius_m = radius_m, frame.top_m = radius_m > 0 ? -0.0075 : 0;
   sonde_snapshot *s = &frame.snapshot;
   s->tick = 0x0102030405060708u;
   s->time_s = 1.5;
@@ -110,6 +112,21 @@ static void colour_stands_behind_the_image(void **state) {
   assert_float_equal(f32_at(b + 182), 30, 0);         //
   assert_float_equal(f32_at(b + 186), 14.3239, 1e-4); // degrees
   assert_int_equal(b[190], 201);
+}
+
+// A curved face tells its radius and where the picture begins; colours follow.
+static void a_curved_face_stands_behind_the_image(void **state) {
+  (void)state;
+  unsigned char b[220] = {0};
+  radius_m = 0.0625;
+  assert_int_equal(make_frame(b, sizeof b, true), 154 + 12 + 36 + 1);
+  radius_m = 0;
+  static const unsigned char HEAD[4] = {4, 0, 0, 0};
+  assert_memory_equal(b + 154, HEAD, sizeof HEAD);
+  assert_float_equal(f32_at(b + 158), 62.5, 0);
+  assert_float_equal(f32_at(b + 162), -7.5, 0);
+  assert_int_equal(b[166], SONDE_DUPLEX_VELOCITY);
+  assert_int_equal(b[202], 201);
 }
 
 // Behind the image, or the colours, with columns whose numbers go on from the first one's.
@@ -254,11 +271,14 @@ static void controls_are_hidden(void **state) {
   assert_string_equal(cJSON_GetObjectItem(all, "posture")->valuestring, "supine");
   assert_string_equal(cJSON_GetObjectItem(none, "case")->valuestring, "");
   assert_null(cJSON_GetObjectItem(none, "posture"));
-  assert_true(cJSON_IsTrue(cJSON_GetObjectItem(all, "doppler")));
-  assert_float_equal(cJSON_GetObjectItem(all, "gate_scale_cm_s")->valuedouble, 25, 1e-9);
-  assert_true(cJSON_IsFalse(cJSON_GetObjectItem(none, "doppler")));
-  assert_null(cJSON_GetObjectItem(none, "colour"));
-  assert_null(cJSON_GetObjectItem(none, "gate"));
+  // The lines of a fan do not lean.
+  for (int fan = 0; fan < 2; ++fan) {
+    const cJSON *of = fan ? none : all;
+    assert_float_equal(cJSON_GetObjectItem(of, "gate_scale_cm_s")->valuedouble, 25, 1e-9);
+    assert_string_equal(cJSON_GetObjectItem(of, "colour")->valuestring, "off");
+    assert_int_equal(cJSON_HasObjectItem(of, "colour_steer_deg"), !fan);
+    assert_int_equal(cJSON_HasObjectItem(of, "gate_steer_deg"), !fan);
+  }
   cJSON_Delete(all);
   cJSON_Delete(none);
 }
@@ -502,6 +522,7 @@ int main(void) {
       cmocka_unit_test(an_encoder_never_writes_beyond_its_buffer),
       cmocka_unit_test(line_has_golden_bytes),
       cmocka_unit_test(colour_stands_behind_the_image),
+      cmocka_unit_test(a_curved_face_stands_behind_the_image),
       cmocka_unit_test(a_spectrum_stands_behind_all),
       cmocka_unit_test(frame_fields_stand_where_the_protocol_says),
       cmocka_unit_test(displacements_are_rounded_and_saturate),

@@ -95,7 +95,7 @@ export class SyntheticThigh {
       dynamic_range_db: 60, focus_mm: 25, tgc_db_per_cm: 0.5, posture: "supine", valsalva: false, gel: true, gel_ml: 0,
       stiffness_scale: 1, damping_scale: 1, friction_scale: 1,
       colour: "off", colour_box_mm: [-14, 14, 6, 36], colour_steer_deg: 0, colour_scale_cm_s: 6, colour_gain_db: 0,
-      doppler: true, gate: false, gate_mm: [0, 20], gate_length_mm: 3, gate_steer_deg: 0, gate_angle_deg: 60, gate_scale_cm_s: 60, gate_baseline: 0, gate_filter_hz: 50, gate_gain_db: 0,
+      gate: false, gate_mm: [0, 20], gate_length_mm: 3, gate_steer_deg: 0, gate_angle_deg: 60, gate_scale_cm_s: 60, gate_baseline: 0, gate_filter_hz: 50, gate_gain_db: 0,
     };
     this.hand = []; // what the free hand and the patient did
     this.pose = { position_mm: [6, RADIUS(140) + 12, 140], rotation: [0.7071, 0.7071, 0, 0] };
@@ -177,7 +177,10 @@ export class SyntheticThigh {
     const s = this.state();
     const nodes = this.skin.points.length / 3;
     const [w, h] = [WIDTH_MM * PX_PER_MM, Math.round(this.controls.depth_mm * PX_PER_MM)];
-    const colour = this.colour(w, h);
+    // A curved face: its radius, and where the picture begins.
+    const fan = Buffer.alloc(this.face ? 12 : 0);
+    if (this.face) fan.writeUInt16LE(4, 0), fan.writeFloatLE(this.face.radius_mm, 4), fan.writeFloatLE(this.face.top_mm, 8);
+    const colour = Buffer.concat([fan, this.colour(w, h)]);
     const spectrum = this.spectrum();
     const b = head(3, ++this.sequence, 140 + 6 * nodes + w * h + colour.length + spectrum.length);
     b.writeBigUInt64LE(BigInt(Math.round(this.time_s * 1000)), 16);
@@ -215,7 +218,7 @@ export class SyntheticThigh {
     const b = Buffer.alloc(56 + count * (8 + bins), 20);
     [3, count, bins, 0].forEach((v, i) => b.writeUInt16LE(v, 2 * i));
     const low = limit * (c.gate_baseline - 1);
-    [...c.gate_mm, c.gate_length_mm, c.gate_steer_deg, c.gate_angle_deg, limit, low, 4000, 0.03, 0.01].forEach((v, i) => b.writeFloatLE(v, 8 + 4 * i));
+    [...c.gate_mm, c.gate_length_mm, c.gate_steer_deg ?? 0, c.gate_angle_deg, limit, low, 4000, 0.03, 0.01].forEach((v, i) => b.writeFloatLE(v, 8 + 4 * i));
     b.writeBigUInt64LE(BigInt(first), 48);
     for (let k = 0; k < count; ++k) {
       const at = 56 + k * (8 + bins);
@@ -238,7 +241,7 @@ export class SyntheticThigh {
     const place = [left * PX_PER_MM + w / 2, top * PX_PER_MM, (right - left) * PX_PER_MM, Math.min(bottom * PX_PER_MM, h) - top * PX_PER_MM].map(Math.round);
     const b = Buffer.alloc(36 + place[2] * place[3], 255);
     [shown, ...place, 0].forEach((v, i) => b.writeUInt16LE(v, 2 * i));
-    [this.controls.colour_scale_cm_s, left, right, top, bottom, this.controls.colour_steer_deg].forEach((v, i) => b.writeFloatLE(v, 12 + 4 * i));
+    [this.controls.colour_scale_cm_s, left, right, top, bottom, this.controls.colour_steer_deg ?? 0].forEach((v, i) => b.writeFloatLE(v, 12 + 4 * i));
     return b;
   }
 

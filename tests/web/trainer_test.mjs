@@ -436,10 +436,37 @@ async function testPulsed(page, mock) {
   await page.keyboard.press("f");
   await page.keyboard.press("Shift+P");
   await page.waitForFunction(() => document.getElementById("spectrum").hidden);
-  // A curved face has none, and the page says so.
-  Object.assign(mock.thigh.controls, { doppler: false, gate: undefined, colour: undefined });
+  await testFan(page, mock);
+}
+
+/** Before a curved face the box is a sector, the gate's beam its line; nothing leans by hand. */
+async function testFan(page, mock) {
+  const radius = 60;
+  mock.thigh.face = { radius_mm: radius, top_mm: radius * (Math.cos(0.5) - 1) };
+  const box = [-14, 14, 10, 40];
+  Object.assign(mock.thigh.controls, { colour: "velocity", colour_box_mm: box, colour_steer_deg: undefined, gate: true, gate_mm: [20, 30], gate_steer_deg: undefined });
   await page.locator("#gel-put").click();
-  await page.waitForFunction(() => document.getElementById("no-doppler").checkVisibility() && document.getElementById("pulsed").hidden);
+  const shape = () => page.evaluate(() => {
+    const svg = document.querySelector(".pane:not([hidden]) .doppler");
+    const scale = svg.viewBox.baseVal.width / window.sonde.image_mm[0];
+    const points = (name) => (document.querySelector(`.pane:not([hidden]) ${name}`).getAttribute("d") ?? "").match(/-?[0-9.]+ -?[0-9.]+/g)?.map((p) => p.split(" ").map((v) => v / scale)) ?? [];
+    return { box: points(".doppler .box"), beam: points(".gate .beam"), wide: window.sonde.image_mm[0] };
+  });
+  await page.waitForFunction(() => document.querySelector(".pane:not([hidden]) .doppler .box").getAttribute("d")?.split("L").length > 20);
+  await page.waitForFunction(() => document.querySelector(".pane:not([hidden]) .gate .beam").getAttribute("d"));
+  const seen = await shape();
+  const top = mock.thigh.face.top_mm;
+  const at = (along, depth) => [(radius + depth) * Math.sin(along / radius) + seen.wide / 2, (radius + depth) * Math.cos(along / radius) - radius - top];
+  const near = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]) < 0.1;
+  check([[-14, 10], [14, 10], [0, 10], [14, 40], [-14, 40], [0, 40]].every((p) => seen.box.some((q) => near(q, at(...p)))), "the colour box is a sector of the fan");
+  check(near(seen.beam[0], at(20, 0)) && near(seen.beam[1], at(20, 28.5)), "the gate lies on its line");
+  check(await page.evaluate(() => !document.getElementById("steer-more").checkVisibility() && !document.getElementById("gate-beam-more").checkVisibility() && document.getElementById("pulsed").checkVisibility()), "nothing leans by hand");
+  const grip = page.locator(".pane:not([hidden]) .gate .grip").first();
+  await grip.focus();
+  await page.keyboard.press("ArrowDown");
+  await page.waitForFunction(() => window.sonde.controls.gate_mm[1] === 30.5 && window.sonde.controls.gate_mm[0] === 20);
+  await picture(page, path.join(outDir, "fan.png"));
+  mock.thigh.face = undefined;
 }
 
 /** Two fingers that go up press. */

@@ -2,6 +2,7 @@
 
 import type { Connection } from "./connection";
 import { announce, beside, draw, find, make, press, pressed, stepper } from "./dom";
+import { type Face, FLAT, halfOf, lineOf, placeOf } from "./lines";
 import type { ColourFrame, ColourShown, Controls } from "./protocol";
 
 const SCALES_CM_S = [1, 2, 3, 4, 6, 8, 10, 15, 20, 30, 40, 60, 100];
@@ -11,9 +12,10 @@ const LEAST_MM = 5; // of the box
 const DEPTH_MM = 200;
 const SQUEEZE_MS = 1500;
 const BREATH_MS = 5000;
+const ARC_PIECES = 16; // of an arc as it is drawn
 const BAR = { left: 10, top: 30, width: 9, height: 96 };
 
-type Box = [number, number, number, number]; // left, right, top, bottom, mm; x from the middle of the face
+type Box = [number, number, number, number]; // left, right along the face from its middle, top, bottom: depths; mm
 
 /** From red, green, blue to a pixel in memory. */
 const pixel = (r: number, g: number, b: number): number => (0xff000000 | (Math.round(b) << 16) | (Math.round(g) << 8) | Math.round(r)) >>> 0;
@@ -59,6 +61,7 @@ export class DopplerBox {
   private wanted: Box | null = null; // while it is dragged
   private scale = 1;
   private size_mm: [number, number] = [1, 1];
+  private face = FLAT;
   private drag: { x: number; y: number; box: Box; corner: boolean } | null = null;
   private readonly outline = draw("path", { class: "box" });
   private readonly body = draw("path", { class: "grip", tabindex: 0, role: "application", "aria-label": "Colour box: arrow keys move it, with Shift its size" });
@@ -84,8 +87,9 @@ export class DopplerBox {
     if (colour) this.paint(colour);
   }
 
-  layout(width_mm: number, height_mm: number, scale: number): void {
+  layout(width_mm: number, height_mm: number, scale: number, face: Face): void {
     this.scale = scale;
+    this.face = face;
     this.size_mm = [width_mm, height_mm];
     this.svg.setAttribute("viewBox", `0 0 ${width_mm * scale} ${height_mm * scale}`);
     if (this.colour) this.paint(this.colour);
@@ -93,13 +97,21 @@ export class DopplerBox {
 
   private paint(colour: ColourFrame): void {
     const [left, right, top, bottom] = this.wanted ?? colour.box_mm;
-    const lean = Math.tan((colour.steer_deg * Math.PI) / 180);
-    const at = (x: number, z: number): string => `${((x + z * lean + this.size_mm[0] / 2) * this.scale).toFixed(1)} ${(z * this.scale).toFixed(1)}`;
-    const shape = `M${at(left, top)} L${at(right, top)} L${at(right, bottom)} L${at(left, bottom)} Z`;
+    const lean = (colour.steer_deg * Math.PI) / 180;
+    const px = (along: number, depth: number): [number, number] => {
+      const [x, z] = placeOf(this.face, along, depth, lean);
+      return [(x + this.size_mm[0] / 2) * this.scale, (z - this.face.top_mm) * this.scale];
+    };
+    // Top and bottom of a sector are arcs.
+    const pieces = this.face.radius_mm > 0 ? ARC_PIECES : 1;
+    const across = (from: number, to: number, depth: number): string =>
+      Array.from({ length: pieces + 1 }, (_, k) => px(from + ((to - from) * k) / pieces, depth).map((v) => v.toFixed(1)).join(" ")).join(" L");
+    const shape = `M${across(left, right, top)} L${across(right, left, bottom)} Z`;
     this.outline.setAttribute("d", shape);
     this.body.setAttribute("d", shape);
-    this.corner.setAttribute("x", `${(right + bottom * lean + this.size_mm[0] / 2) * this.scale - 12}`);
-    this.corner.setAttribute("y", `${bottom * this.scale - 12}`);
+    const [x, y] = px(right, bottom);
+    this.corner.setAttribute("x", `${x - 12}`);
+    this.corner.setAttribute("y", `${y - 12}`);
     this.svg.classList.toggle("still", !this.enabled);
     const key = `${colour.shown} ${colour.limit_cm_s.toFixed(1)}`;
     if (key !== this.barKey) this.paintBar(colour);
@@ -129,7 +141,13 @@ export class DopplerBox {
   }
 
   private move(e: PointerEvent): void {
-    if (this.drag) this.put(this.drag.box, (e.clientX - this.drag.x) / this.scale, (e.clientY - this.drag.y) / this.scale, this.drag.corner);
+    if (!this.drag) return;
+    const { box, corner } = this.drag;
+    // How far its middle, or the corner, is dragged along the face and in depth.
+    const [along, depth] = corner ? [box[1], box[3]] : [(box[0] + box[1]) / 2, (box[2] + box[3]) / 2];
+    const [x, z] = placeOf(this.face, along, depth);
+    const to = lineOf(this.face, x + (e.clientX - this.drag.x) / this.scale, z + (e.clientY - this.drag.y) / this.scale);
+    this.put(box, to[0] - along, to[1] - depth, corner);
   }
 
   private end(): void {
@@ -151,7 +169,7 @@ export class DopplerBox {
   /** The box moved, or its lower right corner, within the image. */
   private put(box: Box, x: number, y: number, corner: boolean): void {
     let [left, right, top, bottom] = box;
-    const [half, deep] = [this.size_mm[0] / 2, Math.min(this.size_mm[1], DEPTH_MM)];
+    const [half, deep] = [halfOf(this.face, this.size_mm[0]), Math.min(this.size_mm[1] + this.face.top_mm, DEPTH_MM)];
     if (corner) {
       right = Math.min(half, Math.max(left + LEAST_MM, right + x));
       bottom = Math.min(deep, Math.max(top + LEAST_MM, bottom + y));
@@ -173,6 +191,7 @@ export class Duplex {
   private controls: Controls | null = null;
   private sent = 0;
   private readonly values = { scale: make("output"), gain: make("output"), steer: make("output") };
+  private readonly lean = stepper("steer", "Steer", this.values.steer, (way) => this.steer(way), "\\: lean of the beam");
 
   constructor(
     private readonly connection: Connection,
@@ -185,7 +204,7 @@ export class Duplex {
     find("colour-tools").append(
       stepper("scale", "Scale", this.values.scale, (way) => this.scale(way), "; and ': velocity from which colour folds"),
       stepper("gain", "Gain", this.values.gain, (way) => this.gain(way), "− and =: how little is shown"),
-      stepper("steer", "Steer", this.values.steer, (way) => this.steer(way), "\\: lean of the beam"),
+      this.lean,
     );
     box.moved = (mm, last) => {
       const now = performance.now(); // a hand that drags need not send more often than pictures come
@@ -202,6 +221,7 @@ export class Duplex {
     find("colour").hidden = controls.colour === undefined;
     find("duplex-tools").hidden = shown === "off" && !controls.gate;
     find("colour-tools").hidden = shown === "off";
+    this.lean.hidden = controls.colour_steer_deg === undefined; // the lines of a fan do not lean
     pressed("colour", shown !== "off");
     pressed("power", shown === "power");
     for (const each of document.querySelectorAll<HTMLButtonElement>("#colour, #duplex-tools button")) each.disabled = !controls.controls;
@@ -219,7 +239,7 @@ export class Duplex {
     else if (code === "KeyV" && shift) this.hand("breathe");
     else if (shown && (code === "Semicolon" || code === "Quote")) this.scale(code === "Semicolon" ? -1 : 1);
     else if (shown && (code === "Minus" || code === "Equal")) this.gain(code === "Minus" ? -1 : 1);
-    else if (shown && code === "Backslash") this.steer(1);
+    else if (shown && code === "Backslash" && !this.lean.hidden) this.steer(1);
     else return false;
     return true;
   }

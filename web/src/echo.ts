@@ -6,6 +6,7 @@ import { label, make } from "./dom";
 import { DopplerBox, paintColour } from "./duplex";
 import { GateOverlay } from "./gate";
 import { PictureGuide } from "./guide";
+import { FLAT } from "./lines";
 import type { Controls, Frame, Picture } from "./protocol";
 
 const RULER_PX = 40;
@@ -34,6 +35,7 @@ class Pane {
   readonly guide = new PictureGuide();
   width_mm = 60;
   height_mm = 70;
+  face = FLAT;
   private readonly image: CanvasRenderingContext2D;
   private data: ImageData | null = null;
 
@@ -59,7 +61,8 @@ class Pane {
     this.doppler.show(frame.colour);
     this.gate.show(frame.spectrum);
     this.image.putImageData(this.data, 0, 0);
-    const same = frame.width_mm === this.width_mm && frame.height_mm === this.height_mm;
+    const same = frame.width_mm === this.width_mm && frame.height_mm === this.height_mm && frame.face.top_mm === this.face.top_mm;
+    this.face = frame.face;
     this.width_mm = frame.width_mm;
     this.height_mm = frame.height_mm;
     return !same;
@@ -71,6 +74,7 @@ class Pane {
     this.image.drawImage(other.canvas, 0, 0);
     this.width_mm = other.width_mm;
     this.height_mm = other.height_mm;
+    this.face = other.face;
     this.calipers.copyFrom(other.calipers);
   }
 
@@ -78,9 +82,9 @@ class Pane {
     const style = { left: `${left}px`, top: `${top}px`, width: `${this.width_mm * scale}px`, height: `${this.height_mm * scale}px` };
     Object.assign(this.root.style, style);
     this.calipers.layout(this.width_mm, this.height_mm, scale);
-    this.doppler.layout(this.width_mm, this.height_mm, scale);
-    this.gate.layout(this.width_mm, this.height_mm, scale);
-    this.guide.layout(this.width_mm, this.height_mm, scale);
+    this.doppler.layout(this.width_mm, this.height_mm, scale, this.face);
+    this.gate.layout(this.width_mm, this.height_mm, scale, this.face);
+    this.guide.layout(this.width_mm, this.height_mm, scale, this.face);
   }
 }
 
@@ -259,15 +263,16 @@ export class EchoView {
 
   private drawMarks(left: number, right: number, scale: number, curve: boolean): void {
     const c = this.marks;
-    const height_mm = this.live.height_mm;
+    const top_mm = this.live.face.top_mm;
+    const depth_mm = this.live.height_mm + top_mm;
     c.clearRect(0, 0, this.overlay.width, this.overlay.height);
     c.font = "11.5px system-ui, sans-serif";
     c.textBaseline = "middle";
     c.strokeStyle = c.fillStyle = INK.scale;
     c.lineWidth = 1;
     c.beginPath();
-    for (let mm = 0; mm <= height_mm + 0.01; mm += 5) {
-      const y = Math.round(TOP_PX + mm * scale) + 0.5;
+    for (let mm = 0; mm <= depth_mm + 0.01; mm += 5) {
+      const y = Math.round(TOP_PX + (mm - top_mm) * scale) + 0.5;
       c.moveTo(right + 3, y);
       c.lineTo(right + (mm % 10 === 0 ? 10 : 6), y);
       if (mm % 10 === 0 && mm > 0) c.fillText(`${mm / 10}`, right + 15, y);
@@ -284,8 +289,9 @@ export class EchoView {
 
   private drawFocus(right: number, scale: number): void {
     const focus_mm = this.controls?.focus_mm ?? NaN;
-    if (!(focus_mm < this.live.height_mm)) return;
-    const y = TOP_PX + focus_mm * scale;
+    const { height_mm, face } = this.live;
+    if (!(focus_mm < height_mm + face.top_mm)) return;
+    const y = TOP_PX + (focus_mm - face.top_mm) * scale;
     const c = this.marks;
     c.fillStyle = INK.focus;
     c.beginPath();

@@ -2,6 +2,7 @@
 
 import type { Connection } from "./connection";
 import { beside, draw, find, make, press, pressed, stepper } from "./dom";
+import { beamOf, type Face, FLAT, halfOf, lineOf, placeOf } from "./lines";
 import type { Controls, GateKey, SpectrumFrame } from "./protocol";
 import type { DopplerSound } from "./sound";
 
@@ -30,7 +31,8 @@ export class GateOverlay {
   private wanted: [number, number] | null = null; // while it is dragged
   private scale = 1;
   private size_mm: [number, number] = [1, 1];
-  private drag: { x: number; y: number; at: [number, number] } | null = null;
+  private face = FLAT;
+  private drag: { x: number; y: number; at: [number, number] } | null = null; // at: x and z
   private turns = false;
   private readonly beam = draw("path", { class: "beam" });
   private readonly walls = draw("path", { class: "walls" });
@@ -68,22 +70,25 @@ export class GateOverlay {
     this.paint(this.gate);
   }
 
-  layout(width_mm: number, height_mm: number, scale: number): void {
+  layout(width_mm: number, height_mm: number, scale: number, face: Face): void {
     this.scale = scale;
+    this.face = face;
     this.size_mm = [width_mm, height_mm];
     this.svg.setAttribute("viewBox", `0 0 ${width_mm * scale} ${height_mm * scale}`);
     if (this.gate) this.paint(this.gate);
   }
 
   private paint(gate: SpectrumFrame): void {
-    const [x, z] = this.wanted ?? [gate.x_mm, gate.z_mm];
-    const lean = (gate.steer_deg * Math.PI) / 180;
+    const [line, depth_mm] = this.wanted ?? [gate.x_mm, gate.z_mm];
+    const [x, z] = placeOf(this.face, line, depth_mm);
+    const lean = beamOf(this.face, line, (gate.steer_deg * Math.PI) / 180);
     const flow = lean + (gate.angle_deg * Math.PI) / 180;
-    const px = (across: number, depth: number): [number, number] => [(across + this.size_mm[0] / 2) * this.scale, depth * this.scale];
+    const px = (across: number, depth: number): [number, number] => [(across + this.size_mm[0] / 2) * this.scale, (depth - this.face.top_mm) * this.scale];
     const at = (across: number, depth: number): string => px(across, depth).map((v) => v.toFixed(1)).join(" ");
     const along = (mm: number): [number, number] => [x + mm * Math.sin(lean), z + mm * Math.cos(lean)];
     const half = gate.length_mm / 2;
-    const [top, bottom] = [-z / Math.cos(lean), (this.size_mm[1] - z) / Math.cos(lean)];
+    const slant = this.face.radius_mm > 0 ? 1 : Math.cos(lean); // depths of a fan are along its lines
+    const [top, bottom] = [-depth_mm / slant, (this.size_mm[1] + this.face.top_mm - depth_mm) / slant];
     this.beam.setAttribute("d", `M${at(...along(top))} L${at(...along(-half))} M${at(...along(half))} L${at(...along(bottom))}`);
     const wall = (mm: number): string => {
       const [ax, az] = along(mm);
@@ -104,13 +109,15 @@ export class GateOverlay {
 
   private down(e: PointerEvent): void {
     if (!this.gate || !this.enabled) return;
-    this.drag = { x: e.clientX, y: e.clientY, at: [this.gate.x_mm, this.gate.z_mm] };
+    this.drag = { x: e.clientX, y: e.clientY, at: placeOf(this.face, this.gate.x_mm, this.gate.z_mm) };
     this.body.setPointerCapture(e.pointerId);
     e.preventDefault();
   }
 
   private move(e: PointerEvent): void {
-    if (this.drag) this.put(this.drag.at[0] + (e.clientX - this.drag.x) / this.scale, this.drag.at[1] + (e.clientY - this.drag.y) / this.scale);
+    if (!this.drag) return;
+    const { x, y, at } = this.drag;
+    this.put(...lineOf(this.face, at[0] + (e.clientX - x) / this.scale, at[1] + (e.clientY - y) / this.scale));
   }
 
   private drop(): void {
@@ -119,9 +126,9 @@ export class GateOverlay {
     this.wanted = null;
   }
 
-  private put(x: number, z: number): void {
-    const half = this.size_mm[0] / 2;
-    this.wanted = [Math.max(-half, Math.min(half, x)), Math.max(1, Math.min(this.size_mm[1] - 1, z))];
+  private put(line: number, depth_mm: number): void {
+    const half = halfOf(this.face, this.size_mm[0]);
+    this.wanted = [Math.max(-half, Math.min(half, line)), Math.max(1, Math.min(this.size_mm[1] + this.face.top_mm - 1, depth_mm))];
     this.moved(this.wanted, false);
     if (this.gate) this.paint(this.gate);
   }
@@ -140,9 +147,11 @@ export class GateOverlay {
   private turn(e: PointerEvent): void {
     if (!this.gate) return;
     const at = this.svg.getBoundingClientRect();
-    const x = (e.clientX - at.left) / this.scale - this.size_mm[0] / 2 - this.gate.x_mm;
-    const z = (e.clientY - at.top) / this.scale - this.gate.z_mm;
-    let angle = (Math.atan2(x, z) * 180) / Math.PI - this.gate.steer_deg;
+    const [gx, gz] = placeOf(this.face, this.gate.x_mm, this.gate.z_mm);
+    const x = (e.clientX - at.left) / this.scale - this.size_mm[0] / 2 - gx;
+    const z = (e.clientY - at.top) / this.scale + this.face.top_mm - gz;
+    const beam = beamOf(this.face, this.gate.x_mm, (this.gate.steer_deg * Math.PI) / 180);
+    let angle = ((Math.atan2(x, z) - beam) * 180) / Math.PI;
     if (angle > 90) angle -= 180;
     if (angle < -90) angle += 180;
     this.turned(Math.max(-80, Math.min(80, Math.round(angle))));
@@ -183,7 +192,9 @@ export class GateTools {
     for (const [key, name, title] of WORDS) {
       const output = make("output");
       this.values.set(key, output);
-      box.append(stepper(`gate-${name.toLowerCase()}`, name, output, (way) => this.step(key, way), title));
+      const row = stepper(`gate-${name.toLowerCase()}`, name, output, (way) => this.step(key, way), title);
+      row.id = `gate-${name.toLowerCase()}`;
+      box.append(row);
     }
     press("doppler-sound", () => this.hear(!sound.on));
     const volume = find<HTMLInputElement>("doppler-volume");
@@ -202,9 +213,8 @@ export class GateTools {
     this.controls = controls;
     const on = controls.gate ?? false;
     this.overlay.enabled = controls.controls;
-    const known = controls.gate !== undefined;
-    find("pulsed").hidden = !known;
-    find("no-doppler").hidden = controls.doppler !== false;
+    find("pulsed").hidden = controls.gate === undefined;
+    find("gate-beam").hidden = controls.gate_steer_deg === undefined; // the lines of a fan do not lean
     find("gate-tools").hidden = !on;
     pressed("pulsed", on);
     if (!on && this.sound.on) this.hear(false);

@@ -2,6 +2,7 @@
 // what is seen of it, and the way to the view. What is said comes from the program.
 
 import { draw } from "./dom";
+import type { Face } from "./lines";
 import type { Picture, PictureMark } from "./protocol";
 
 const ROW_PX = 15;
@@ -29,7 +30,7 @@ export function wrap(text: string, letters: number): string[] {
 export class PictureGuide {
   readonly svg = draw("svg", { class: "guide", "aria-hidden": "true" });
   private picture: Picture | null = null;
-  private size = { width_mm: 60, height_mm: 70, scale: 1 };
+  private size = { width_mm: 60, height_mm: 70, scale: 1, top_mm: 0 };
   private key = "";
 
   show(picture: Picture | null): void {
@@ -40,15 +41,15 @@ export class PictureGuide {
     this.paint();
   }
 
-  layout(width_mm: number, height_mm: number, scale: number): void {
-    this.size = { width_mm, height_mm, scale };
+  layout(width_mm: number, height_mm: number, scale: number, face: Face): void {
+    this.size = { width_mm, height_mm, scale, top_mm: face.top_mm };
     this.svg.setAttribute("viewBox", `0 0 ${width_mm * scale} ${height_mm * scale}`);
     this.paint();
   }
 
   private paint(): void {
     const p = this.picture;
-    const marks = (p?.marks ?? []).filter((m) => m.depth_mm < this.size.height_mm && Math.abs(m.x_mm) < this.size.width_mm / 2);
+    const marks = (p?.marks ?? []).filter((m) => m.depth_mm < this.size.height_mm + this.size.top_mm && Math.abs(m.x_mm) < this.size.width_mm / 2);
     const parts: SVGElement[] = [];
     for (const side of [-1, 1]) parts.push(...this.side(side, marks.filter((m) => (m.x_mm < 0 ? -1 : 1) === side)));
     if (p) parts.push(...this.way(p));
@@ -75,17 +76,17 @@ export class PictureGuide {
 
   /** Where the label of a mark begins: at its height when there is room beside the ring, else below it. */
   private beside(mark: PictureMark, side: number, letters: number): number {
-    const { width_mm, scale } = this.size;
+    const { width_mm, scale, top_mm } = this.size;
     const room = (width_mm / 2 - Math.abs(mark.x_mm) - mark.half_mm) * scale - GAP_PX - EDGE_PX;
-    const middle = mark.depth_mm * scale;
+    const middle = (mark.depth_mm - top_mm) * scale;
     const long = Math.min(letters, Math.max(mark.name.length, mark.why.length)) * LETTER_PX;
     return side !== 0 && room > long ? middle : middle + Math.max(6, mark.flat_mm * scale + GAP_PX) + ROW_PX;
   }
 
   private row(row: Row, side: number, w: number): SVGElement[] {
-    const { width_mm, scale } = this.size;
+    const { width_mm, scale, top_mm } = this.size;
     const { mark, lines } = row;
-    const [cx, cy] = [(width_mm / 2 + mark.x_mm) * scale, mark.depth_mm * scale];
+    const [cx, cy] = [(width_mm / 2 + mark.x_mm) * scale, (mark.depth_mm - top_mm) * scale];
     const [rx, ry] = [Math.max(6, mark.half_mm * scale + GAP_PX), Math.max(6, mark.flat_mm * scale + GAP_PX)];
     const x = side < 0 ? EDGE_PX : w - EDGE_PX;
     const long = Math.max(...lines.map((l) => l.length)) * LETTER_PX;

@@ -1,5 +1,6 @@
 // Messages of docs/page_protocol.md: types, decoding of the binary ones. Lengths are mm.
 
+import { type Face, FLAT } from "./lines";
 import type { SheetMessage } from "./worksheet";
 
 export type Vec3 = [number, number, number];
@@ -108,11 +109,10 @@ export interface Controls {
   colour?: ColourShown;
   /** left, right (from the middle of the face), top, bottom */
   colour_box_mm?: [number, number, number, number];
+  /** none before a curved face, whose lines are a fan */
   colour_steer_deg?: number;
   colour_scale_cm_s?: number;
   colour_gain_db?: number;
-  /** a curved face has no Doppler */
-  doppler?: boolean;
   gate?: boolean;
   /** x from the middle of the face, depth */
   gate_mm?: [number, number];
@@ -406,6 +406,7 @@ export interface Frame {
   height: number;
   width_mm: number;
   height_mm: number;
+  face: Face;
   pixels: Uint8Array;
   /** null: Doppler is off */
   colour: ColourFrame | null;
@@ -464,7 +465,9 @@ const MESH_FIXED = 24;
 const FRAME_FIXED = 140;
 const COLOUR_FIXED = 36;
 const SPECTRUM_FIXED = 56;
+const FAN_BYTES = 12;
 const SPECTRUM = 3; // what its block begins with, where colours have 1 or 2
+const FAN = 4; // likewise, of a curved face
 const MAGIC = 0x45444e53; // "SNDE", little-endian
 
 /** Reads one value after the other. */
@@ -528,6 +531,12 @@ function decodeSpectrum(bytes: ArrayBuffer, at: number): SpectrumFrame | null {
   return frame;
 }
 
+function decodeFace(bytes: ArrayBuffer, at: number): Face {
+  if (at + FAN_BYTES > bytes.byteLength || new DataView(bytes).getUint16(at, true) !== FAN) return FLAT;
+  const c = new Cursor(new DataView(bytes), at + 4);
+  return { radius_mm: c.f32(), top_mm: c.f32() };
+}
+
 function decodeColour(bytes: ArrayBuffer, at: number): ColourFrame | null {
   if (at + COLOUR_FIXED > bytes.byteLength || new DataView(bytes).getUint16(at, true) === SPECTRUM) return null;
   const c = new Cursor(new DataView(bytes), at);
@@ -576,7 +585,9 @@ function decodeFrame(bytes: ArrayBuffer, sequence: number): Frame {
   const width_mm = c.f32();
   const height_mm = c.f32();
   const quantum_mm = c.f32();
-  const behind = FRAME_FIXED + nodes * 6 + width * height;
+  const image = FRAME_FIXED + nodes * 6 + width * height;
+  const face = decodeFace(bytes, image);
+  const behind = image + (face.radius_mm > 0 ? FAN_BYTES : 0);
   const colour = decodeColour(bytes, behind);
   return {
     kind: "frame",
@@ -588,6 +599,7 @@ function decodeFrame(bytes: ArrayBuffer, sequence: number): Frame {
     height,
     width_mm,
     height_mm,
+    face,
     pixels: new Uint8Array(bytes, FRAME_FIXED + nodes * 6, width * height),
     colour,
     spectrum: decodeSpectrum(bytes, behind + (colour ? COLOUR_FIXED + colour.pixels.length : 0)),

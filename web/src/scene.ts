@@ -533,7 +533,7 @@ export class LegScene {
     this.texture.needsUpdate = true;
     this.plane.visible = true;
     this.plane.scale.set(frame.width_mm, frame.height_mm, 1);
-    this.plane.position.set(0, 0, frame.height_mm / 2);
+    this.plane.position.set(0, 0, frame.face.top_mm + frame.height_mm / 2);
   }
 
   // ---- pointing --------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "echo/lines.h"
 #include "exam/session.h"
 #include "haptics/motion.h"
 
@@ -39,6 +40,9 @@ sonde_status sonde_environment_open(sonde_environment *env, sonde_patient *patie
   sonde_echo_def image = sonde_echo_def_default();
   image.scanner = env->def->scanner;
   if (!status && draws) status = sonde_echo_create(env->interior, &image, &env->echo, error);
+  if (!status && draws && image.scanner && image.scanner->radius_m > 0)
+    status = sonde_echo_check_view(sight_aperture(image.scanner, env->probe->half_x_m),
+                                   image.scanner->radius_m, error);
   if (status) return status;
 
   // The first environment of a patient gives the others their rest.

@@ -4,6 +4,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "echo/lines.h"
 #include "exam/vessels.h"
 #include "haptics/motion.h"
 
@@ -145,6 +146,6 @@ void sonde_environment_look(sonde_environment *env) {
   flow.t_s = *env->time_s;
   flow.circulation = env->subject->now.circulation;
   sonde_echo_set_flow(env->echo, &flow);
-  sonde_echo_render(env->echo, pose, 2 * env->probe->half_x_m, &pathology, &start->settings,
-                    &image);
+  sonde_echo_render(env->echo, pose, sight_aperture(env->def->scanner, env->probe->half_x_m),
+                    &pathology, &start->settings, &image);
 }

@@ -190,7 +190,6 @@ static sonde_status do_press(leg *l, uint32_t number, sonde_dataset_store *store
   flow.t_s = press.at_s, flow.circulation = l->setup.circulation;
   sonde_echo *echo = NULL;
   status = sonde_echo_create(l->interior, &drawing, &echo, error);
-  if (!status) status = sonde_echo_set_radius(echo, press.scanner.radius_m, error);
   if (!status) sonde_echo_set_flow(echo, &flow);
   sonde_state_reset(l->state);
   const sonde_vec3 axis = q_rotate(press.start.rotation, vec3(0, 0, 1));

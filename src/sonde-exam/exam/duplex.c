@@ -6,7 +6,7 @@
 #include "sonde/limb_model.h"
 
 sonde_duplex_controls sonde_duplex_controls_default(void) {
-  return (sonde_duplex_controls){.box = {-0.014, 0.014, 0.006, 0.036, 0},
+  return (sonde_duplex_controls){.box = {-0.014, 0.014, 0.006, 0.036, 0, 0},
                                  .scale_m_s = 0.06,
                                  .gate = sonde_gate_settings_default()};
 }
@@ -64,6 +64,7 @@ sonde_duplex_controls sonde_duplex_clean(const sonde_duplex_controls *wanted,
   }
   c.box.right_m = fmax(c.box.right_m, c.box.left_m + least_m);
   c.box.bottom_m = fmax(c.box.bottom_m, c.box.top_m + least_m);
+  c.box.radius_m = 0; // the scanner's, whatever is wanted
   c.gate = sonde_gate_clean(&wanted->gate, &before->gate);
   return c;
 }

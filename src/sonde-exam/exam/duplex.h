@@ -37,9 +37,9 @@ typedef struct sonde_duplex {
   sonde_colour *colour;
   sonde_colour_cell *cells; // [SONDE_COLOUR_CELLS]
   bool flows;               // the network runs: some Doppler is on
-  // tissue of the last picture with colour: at rest, by place in the picture
+  // tissue of the last picture with colour: at rest, by line and depth
   bool seen;
-  double seen_s, seen_width_m, seen_height_m;
+  double seen_s, seen_aperture_m, seen_depth_m;
   sonde_vec3 rest_m[SONDE_DUPLEX_GRID * SONDE_DUPLEX_GRID];
   sonde_gate *gate;
   // tissue in the gate when it was put last: at rest, when, and where the gate was

@@ -3,6 +3,7 @@
 
 #include "base/base.h"
 #include "base/maths.h"
+#include "echo/lines.h"
 #include "haptics/motion.h"
 #include "haptics/ranges.h"
 
@@ -53,8 +54,10 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
   image.scanner = def->scanner, image.rolling = def->scanner != NULL;
   if (!status && inside)
     status = sonde_echo_create(session->interior, &image, &session->echo, error);
-  const bool flat = !(def->scanner && def->scanner->radius_m > 0);
-  if (!status && inside && flat)
+  for (uint32_t i = 0; i < count && !status && session->scanner.radius_m > 0; ++i)
+    status = sonde_echo_check_view(sight_aperture(&session->scanner, session->probes[i].half_x_m),
+                                   session->scanner.radius_m, error);
+  if (!status && inside)
     status =
         sonde_duplex_create(def->model, session->interior, session->echo, &session->duplex, error);
   if (!status) {
@@ -165,6 +168,7 @@ sonde_status sonde_session_create(const sonde_session_def *def, sonde_device *de
   session->controls = sonde_session_def_default().controls;
   session->has_findings = def->findings != NULL;
   if (def->findings) session->findings = *def->findings;
+  if (def->scanner) session->scanner = *def->scanner;
   sonde_safety_init(&session->safety, &def->limits);
   sonde_render_def rendering = def->rendering;
   rendering.dt_s = session->dt_s;

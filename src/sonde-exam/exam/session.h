@@ -120,7 +120,8 @@ struct sonde_session {
   // image
   sonde_interior *interior;
   sonde_echo *echo;
-  sonde_duplex *duplex;            // NULL: a curved face, or no inside
+  sonde_scanner scanner;           // all 0: the plain one
+  sonde_duplex *duplex;            // NULL: no inside
   sonde_pathology shown_pathology; // of the controls
   uint32_t lines;                  // of the image
   sonde_vec3 *line_m;              // [lines] where each starts

@@ -5,6 +5,7 @@
 #include "base/base.h"
 #include "base/clock.h"
 #include "base/maths.h"
+#include "echo/lines.h"
 #include "haptics/gel.h"
 
 #include <string.h>
@@ -24,7 +25,8 @@ static void prepare_beam(sonde_session *session, const sonde_echo_settings *aske
   (void)sonde_echo_prepare(session->echo, session->coming.aperture_m, &coming, steps);
 }
 
-// Gel and air below each line of the image in use; returns their mean, NaN without gel.
+// Gel and air below each line of the image in use; returns their mean, NaN without gel. The probe's
+// body touches with a flat face, whatever the fan of a curved one is: each line starts on that.
 static double couple(sonde_session *session, const unsigned char *slot) {
   const sonde_surface_slot *head = (const void *)slot;
   if (!session->echo) return (double)NAN;
@@ -34,8 +36,10 @@ static double couple(sonde_session *session, const unsigned char *slot) {
   }
   double sum = 0, width_m = session->beam.aperture_m;
   for (uint32_t l = 0; l < session->lines; ++l) {
-    double across_m = width_m * ((double)l / (session->lines - 1) - 0.5);
-    session->line_m[l] = pose_apply(head->snapshot.world_from_probe, vec3(across_m, 0, 0));
+    const double along_m = width_m * ((double)l / (session->lines - 1) - 0.5);
+    sonde_vec3 start = sight_place((sight_lines){session->scanner.radius_m, 0}, along_m, 0);
+    start.z = 0;
+    session->line_m[l] = pose_apply(head->snapshot.world_from_probe, start);
   }
   sonde_gel_coupling_of(session->subject->gel, (const void *)(slot + session->film_at),
                         session->touched, (const void *)(slot + session->positions_at),
@@ -96,7 +100,8 @@ bool sonde_session_follow(sonde_session *session) {
   // The number of images is the same for every beam, whatever was built before: a replay that
   // starts anywhere changes beams at the same image.
   const uint32_t images = (SONDE_ECHO_PREPARE_STEPS + BEAM_STEPS - 1) / BEAM_STEPS;
-  const sonde_session_beam now = {2.0 * session->probes[head->snapshot.probe].half_x_m,
+  const double half_m = session->probes[head->snapshot.probe].half_x_m;
+  const sonde_session_beam now = {sight_aperture(&session->scanner, half_m),
                                   head->controls.echo.frequency_hz, head->controls.echo.depth_m,
                                   head->controls.echo.focus_m};
   if (!(session->beam.aperture_m > 0)) session->beam = now;
@@ -164,7 +169,8 @@ void sonde_session_draw(sonde_session *session) {
   } else {
     memset(image.pixels, 0, (size_t)image.width * image.height);
     if (session->echo)
-      image.width_m = session->beam.aperture_m, image.height_m = session->beam.depth_m;
+      image.width_m = session->beam.aperture_m, image.height_m = session->beam.depth_m,
+      image.top_m = 0;
   }
   *frame = (sonde_frame){.snapshot = head->snapshot,
                          .skin_m = skin_m,
@@ -173,6 +179,8 @@ void sonde_session_draw(sonde_session *session) {
                          .height = image.height,
                          .width_m = image.width_m,
                          .height_m = image.height_m,
+                         .top_m = image.top_m,
+                         .radius_m = session->scanner.radius_m,
                          .colour = colour,
                          .spectrum = spectrum};
   frame->snapshot.gel_coupling = coupling;

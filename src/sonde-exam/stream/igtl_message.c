@@ -141,7 +141,7 @@ static void put_image(bytes_cursor *out, const sonde_frame *frame, const igtl_st
   put_point(out, v_scale(axis[2], pixel_mm[1]));
   put_point(out, v_scale(axis[1], -pixel_mm[0]));
   const sonde_vec3 face = frame->snapshot.world_from_probe.position;
-  put_point(out, v_scale(v_madd(face, 0.5 * frame->height_m, axis[2]), MM));
+  put_point(out, v_scale(v_madd(face, frame->top_m + 0.5 * frame->height_m, axis[2]), MM));
   for (int k = 0; k < 3; ++k) put(out, 2, 0); // the part that is sent: all
   put(out, 2, frame->width);
   put(out, 2, frame->height);
@@ -194,8 +194,9 @@ size_t igtl_encode_frame(const sonde_frame *frame, const igtl_style *style, unsi
   const sonde_vec3 scaled[3] = {vec3(pixel_mm[0], 0, 0), vec3(0, 0, pixel_mm[1]),
                                 vec3(0, -pixel_mm[0], 0)};
   put_image(&out, frame, style, turned, pixel_mm);
-  put_transform(&out, style, "ImageToProbe", scaled,
-                vec3(0.5 * (pixel_mm[0] - MM * frame->width_m), 0, 0.5 * pixel_mm[1]));
+  put_transform(
+      &out, style, "ImageToProbe", scaled,
+      vec3(0.5 * (pixel_mm[0] - MM * frame->width_m), 0, MM * frame->top_m + 0.5 * pixel_mm[1]));
   put_transform(&out, style, "ProbeToReference", turned, v_scale(s->world_from_probe.position, MM));
   put_force(&out, style, "ProbeForce", s->force_n);
   put_force(&out, style, "ProbeRenderedForce", s->rendered_force_n);

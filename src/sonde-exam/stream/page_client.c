@@ -90,11 +90,10 @@ static bool take_message(page_client *client, page_out *out) {
     ++client->scene->references;
   } else if (news) {
     uint32_t probe = server->controls.probe;
-    page_write_controls(&text, &server->controls,
-                        probe < source->probe_count ? source->probes[probe]->name : "",
-                        (page_hidden){server->hide_case, v_norm2(source->model->gravity.up) > 0,
-                                      source->no_doppler},
-                        server->gel_m3, role);
+    page_write_controls(
+        &text, &server->controls, probe < source->probe_count ? source->probes[probe]->name : "",
+        (page_hidden){server->hide_case, v_norm2(source->model->gravity.up) > 0, source->fan},
+        server->gel_m3, role);
     client->told_serial = server->controls_serial;
     client->told_role = role;
   } else if (topic < SONDE_PAGE_STATUS) {

@@ -102,6 +102,7 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
   size_t pixels = (size_t)frame->width * frame->height;
   size_t size = PAGE_FRAME_FIXED_BYTES + 6 * (size_t)rest->vertex_count + pixels;
   const sonde_colour_overlay *over = &frame->colour.over;
+  if (frame->radius_m > 0) size += PAGE_FAN_BYTES;
   if (frame->colour.shown) size += PAGE_COLOUR_FIXED_BYTES + (size_t)over->width * over->height;
   const sonde_gate_spectrum *heard = &frame->spectrum;
   if (heard->on)
@@ -144,6 +145,12 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
     bytes_u16(&out, quantise((double)frame->skin_m[3 * i + 2] - p.z));
   }
   bytes_put(&out, frame->pixels, pixels);
+  if (frame->radius_m > 0) {
+    bytes_u16(&out, PAGE_FAN);
+    bytes_u16(&out, 0);
+    bytes_f32(&out, frame->radius_m * MM);
+    bytes_f32(&out, frame->top_m * MM);
+  }
   if (frame->colour.shown) {
     const sonde_colour_box *box = &frame->colour.box;
     SONDE_ASSERT(over->left + over->width <= 0xffff && over->top + over->height <= 0xffff);

@@ -14,9 +14,11 @@ enum {
   PAGE_HEADER_BYTES = 16,
   PAGE_MESH_FIXED_BYTES = 24,     // header and counts, before the points
   PAGE_FRAME_FIXED_BYTES = 140,   // header and snapshot, before the displacements
+  PAGE_FAN_BYTES = 12,            // of a curved face, behind the image
   PAGE_COLOUR_FIXED_BYTES = 36,   // before the colours of a frame
   PAGE_SPECTRUM_FIXED_BYTES = 56, // before the columns of a frame's spectrum
   PAGE_SPECTRUM = 3,              // what it begins with, where colours have a sonde_duplex_shown
+  PAGE_FAN = 4,                   // likewise
   PAGE_COMMAND_BYTES = 4096,      // longest message accepted from a browser
   PAGE_COMMAND_DEPTH = 3,         // deepest nesting accepted
 };
@@ -69,7 +71,7 @@ typedef struct page_role {
 typedef struct page_hidden {
   bool pathology; // a learner may not be told its name
   bool posture;   // the model says how it is held
-  bool doppler;   // a curved face has none
+  bool steer;     // the lines of a curved face are a fan, which does not lean
 } page_hidden;
 
 // A sonde_duplex_shown in messages.

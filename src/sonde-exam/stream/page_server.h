@@ -37,7 +37,7 @@ typedef struct page_source {
   const sonde_probe *const *probes; // [probe_count]
   uint32_t probe_count;
   double force_limit_n;
-  bool no_doppler;                               // the scanner's face is curved
+  bool fan;                                      // the scanner's face is curved
   bool (*frame)(void *self, sonde_frame *frame); // called by the pump only
   void (*goal)(void *self, sonde_pose pose);     // these three: one thread at a time
   void (*control)(void *self, const sonde_session_controls *controls);

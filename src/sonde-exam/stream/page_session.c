@@ -52,7 +52,7 @@ static sonde_status make_source(sonde_session *session, double force_limit_n, pa
                           .probes = probes,
                           .probe_count = session->probe_count,
                           .force_limit_n = force_limit_n,
-                          .no_doppler = session->echo && !session->duplex,
+                          .fan = session->scanner.radius_m > 0,
                           .frame = take_frame,
                           .goal = set_goal,
                           .control = set_controls,

@@ -155,30 +155,28 @@ void page_write_controls(sonde_json_out *out, const sonde_session_controls *cont
   put_real(out, "stiffness_scale", controls->stiffness_scale);
   put_real(out, "damping_scale", controls->damping_scale);
   put_real(out, "friction_scale", controls->friction_scale);
-  sonde_json_put_bool(out, "doppler", !hidden.doppler);
-  if (!hidden.doppler) {
-    const sonde_duplex_controls *duplex = &controls->duplex;
-    // Colour over the image.
-    const double *box_m = &duplex->box.left_m;
-    SONDE_ASSERT(duplex->shown <= SONDE_DUPLEX_POWER);
-    sonde_json_put_text(out, "colour", page_colour_word[duplex->shown]);
-    sonde_json_begin_list(out, "colour_box_mm");
-    for (int k = 0; k < 4; ++k) put_real(out, NULL, box_m[k] * 1e3);
-    sonde_json_end(out);
-    put_real(out, "colour_steer_deg", duplex->box.steer_rad * 180 / SONDE_PI);
-    put_real(out, "colour_scale_cm_s", duplex->scale_m_s * 100);
-    put_real(out, "colour_gain_db", duplex->gain_db);
-    // The gate, which flat faces have.
-    const sonde_gate_settings *gate = &duplex->gate;
-    sonde_json_put_bool(out, "gate", duplex->gated);
-    sonde_json_begin_list(out, "gate_mm");
-    put_real(out, NULL, gate->x_m * 1e3);
-    put_real(out, NULL, gate->z_m * 1e3);
-    sonde_json_end(out);
-    for (size_t k = 0; k < PAGE_GATE_NUMBERS; ++k)
+  const sonde_duplex_controls *duplex = &controls->duplex;
+  // Colour over the image.
+  const double *box_m = &duplex->box.left_m;
+  SONDE_ASSERT(duplex->shown <= SONDE_DUPLEX_POWER);
+  sonde_json_put_text(out, "colour", page_colour_word[duplex->shown]);
+  sonde_json_begin_list(out, "colour_box_mm");
+  for (int k = 0; k < 4; ++k) put_real(out, NULL, box_m[k] * 1e3);
+  sonde_json_end(out);
+  if (!hidden.steer) put_real(out, "colour_steer_deg", duplex->box.steer_rad * 180 / SONDE_PI);
+  put_real(out, "colour_scale_cm_s", duplex->scale_m_s * 100);
+  put_real(out, "colour_gain_db", duplex->gain_db);
+  // The gate.
+  const sonde_gate_settings *gate = &duplex->gate;
+  sonde_json_put_bool(out, "gate", duplex->gated);
+  sonde_json_begin_list(out, "gate_mm");
+  put_real(out, NULL, gate->x_m * 1e3);
+  put_real(out, NULL, gate->z_m * 1e3);
+  sonde_json_end(out);
+  for (size_t k = 0; k < PAGE_GATE_NUMBERS; ++k)
+    if (!(hidden.steer && page_gate_number[k].offset == offsetof(sonde_gate_settings, steer_rad)))
       put_real(out, page_gate_number[k].key,
                *(const double *)((const char *)gate + page_gate_number[k].offset) /
                    page_gate_number[k].si);
-  }
   sonde_json_end(out);
 }

@@ -9,16 +9,17 @@
 
 void sonde_colour_place(const sonde_colour_box *box, uint32_t line, uint32_t row, double xz_m[2]) {
   SONDE_ASSERT(box && line < SONDE_COLOUR_LINES && row < SONDE_COLOUR_ROWS);
-  const double x = box->left_m + (box->right_m - box->left_m) * (line + 0.5) / SONDE_COLOUR_LINES;
-  xz_m[1] = box->top_m + (box->bottom_m - box->top_m) * (row + 0.5) / SONDE_COLOUR_ROWS;
-  xz_m[0] = x + xz_m[1] * tan(box->steer_rad);
+  const double depth_m =
+      box->top_m + (box->bottom_m - box->top_m) * (row + 0.5) / SONDE_COLOUR_ROWS;
+  const sonde_vec3 place = sight_place(colour_sight(box), colour_line(box, line), depth_m);
+  xz_m[0] = place.x, xz_m[1] = place.z;
 }
 
 bool sonde_colour_find(const sonde_colour_box *box, double x_m, double z_m, double line_row[2]) {
   SONDE_ASSERT(box && line_row);
-  const double x = x_m - z_m * tan(box->steer_rad);
-  line_row[0] = (x - box->left_m) / (box->right_m - box->left_m) * SONDE_COLOUR_LINES - 0.5;
-  line_row[1] = (z_m - box->top_m) / (box->bottom_m - box->top_m) * SONDE_COLOUR_ROWS - 0.5;
+  const sonde_vec3 at = sight_find(colour_sight(box), vec3(x_m, 0, z_m));
+  line_row[0] = (at.x - box->left_m) / (box->right_m - box->left_m) * SONDE_COLOUR_LINES - 0.5;
+  line_row[1] = (at.z - box->top_m) / (box->bottom_m - box->top_m) * SONDE_COLOUR_ROWS - 0.5;
   const double rounding = 1e-9;
   return line_row[0] >= -rounding && line_row[0] <= SONDE_COLOUR_LINES - 1 + rounding &&
          line_row[1] >= -rounding && line_row[1] <= SONDE_COLOUR_ROWS - 1 + rounding;

@@ -2,6 +2,7 @@
 #ifndef SONDE_SRC_FLOW_COLOUR_H
 #define SONDE_SRC_FLOW_COLOUR_H
 
+#include "echo/lines.h"
 #include "sonde/flow_colour.h"
 
 enum { COLOUR_PACKET = 16, COLOUR_ORDER = 3, COLOUR_NORMALS = 1 << 16 };
@@ -9,6 +10,14 @@ enum { COLOUR_PACKET = 16, COLOUR_ORDER = 3, COLOUR_NORMALS = 1 << 16 };
 // Velocity along the beam from which pulses of a rate fold.
 static inline double doppler_limit(double frequency_hz, double pulse_hz) {
   return COLOUR_SOUND_M_S * pulse_hz / (4 * frequency_hz);
+}
+
+// The lines of a box, and where line k, from 0, of its cells' middles leaves the face.
+static inline sight_lines colour_sight(const sonde_colour_box *box) {
+  return (sight_lines){box->radius_m, box->steer_rad};
+}
+static inline double colour_line(const sonde_colour_box *box, double k) {
+  return box->left_m + (box->right_m - box->left_m) * (k + 0.5) / SONDE_COLOUR_LINES;
 }
 
 struct sonde_colour {

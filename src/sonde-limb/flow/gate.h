@@ -17,6 +17,7 @@ typedef struct gate_scatterer {
 struct sonde_gate {
   bool put, drawn; // in a scene; scatterers have places
   sonde_gate_settings settings;
+  double radius_m; // of the face, 0: flat
   double frequency_hz, pulse_hz, tissue_m_s, loss_db;
   uint64_t seed, numbers; // of random numbers since the scatterers were drawn
   double half_m[3];       // of the box that holds the scatterers

@@ -43,12 +43,14 @@ static double power_at(const sonde_gate *g, const double at_m[3]) {
 
 // Axes of the gate's frame in that of the probe.
 static void axes_of(const sonde_gate *g, sonde_vec3 axis[3]) {
-  const double c = cos(g->settings.steer_rad), s = sin(g->settings.steer_rad);
-  axis[0] = vec3(c, 0, -s), axis[1] = vec3(0, 1, 0), axis[2] = vec3(s, 0, c);
+  const sight_lines sight = {g->radius_m, g->settings.steer_rad};
+  axis[2] = sight_beam(sight, g->settings.x_m);
+  axis[0] = vec3(axis[2].z, 0, -axis[2].x), axis[1] = vec3(0, 1, 0);
 }
 
 static sonde_vec3 world_of(const sonde_gate *g, sonde_pose probe, const double at_m[3]) {
-  sonde_vec3 axis[3], at = vec3(g->settings.x_m, 0, g->settings.z_m);
+  sonde_vec3 axis[3],
+      at = sight_place((sight_lines){g->radius_m, 0}, g->settings.x_m, g->settings.z_m);
   axes_of(g, axis);
   for (int k = 0; k < 3; ++k) at = v_madd(at, at_m[k], axis[k]);
   return pose_apply(probe, at);
@@ -77,12 +79,15 @@ void sonde_gate_put(sonde_gate *g, const sonde_flow_scene *scene,
                     const sonde_gate_settings *settings, const sonde_gate_place *place) {
   SONDE_ASSERT(g && scene && settings && place && place->frequency_hz > 0);
   const sonde_gate_settings before = g->settings;
-  const double way_m = (settings->z_m + 0.5 * settings->length_m) / cos(settings->steer_rad);
+  const double radius_m = sonde_truth_view_of(place->echo).radius_m,
+               steer_rad = radius_m > 0 ? 0 : settings->steer_rad;
+  const double way_m = (settings->z_m + 0.5 * settings->length_m) / cos(steer_rad);
   const double pulse_hz = clamp(4 * place->frequency_hz * settings->scale_m_s / COLOUR_SOUND_M_S,
                                 least_hz, fmin(most_hz, COLOUR_SOUND_M_S / (2 * way_m)));
   const bool same = g->put && pulse_hz == g->pulse_hz && place->frequency_hz == g->frequency_hz &&
                     settings->baseline == before.baseline;
-  g->settings = *settings, g->frequency_hz = place->frequency_hz, g->pulse_hz = pulse_hz;
+  g->settings = *settings, g->settings.steer_rad = steer_rad, g->radius_m = radius_m;
+  g->frequency_hz = place->frequency_hz, g->pulse_hz = pulse_hz;
   g->tissue_m_s = place->tissue_m_s, g->loss_db = place->loss_db;
   const double time_s = scene->flow.time_s;
   if (!same) {

@@ -12,14 +12,21 @@ void sonde_colour_paint(sonde_colour *c, const sonde_colour_box *box, double gai
   SONDE_ASSERT(c && box && image && overlay && overlay->pixels);
   enum { LINES = SONDE_COLOUR_LINES, ROWS = SONDE_COLOUR_ROWS };
   const double size = image->width_m / image->width, lean = tan(box->steer_rad);
-  // The pixels whose middles the box may hold.
-  const double shift[2] = {lean * box->top_m, lean * box->bottom_m};
-  const double left = (box->left_m + fmin(shift[0], shift[1])) / size + 0.5 * image->width;
-  const double right = (box->right_m + fmax(shift[0], shift[1])) / size + 0.5 * image->width;
-  overlay->left = (uint32_t)clamp(floor(left), 0, image->width);
-  overlay->top = (uint32_t)clamp(floor(box->top_m / size), 0, image->height);
-  overlay->width = (uint32_t)clamp(ceil(right), 0, image->width);
-  overlay->height = (uint32_t)clamp(ceil(box->bottom_m / size), 0, image->height);
+  const bool fan = box->radius_m > 0;
+  // The pixels whose middles the box may hold: a sector is deepest on its line nearest to the
+  // middle.
+  const double along[3] = {box->left_m, box->right_m, clamp(0, box->left_m, box->right_m)};
+  double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+  for (int k = 0; k < 6; ++k) {
+    const sonde_vec3 at =
+        sight_place(colour_sight(box), along[k / 2], k % 2 ? box->bottom_m : box->top_m);
+    low[0] = fmin(low[0], at.x), high[0] = fmax(high[0], at.x);
+    low[1] = fmin(low[1], at.z), high[1] = fmax(high[1], at.z);
+  }
+  overlay->left = (uint32_t)clamp(floor(low[0] / size + 0.5 * image->width), 0, image->width);
+  overlay->top = (uint32_t)clamp(floor((low[1] - image->top_m) / size), 0, image->height);
+  overlay->width = (uint32_t)clamp(ceil(high[0] / size + 0.5 * image->width), 0, image->width);
+  overlay->height = (uint32_t)clamp(ceil((high[1] - image->top_m) / size), 0, image->height);
   overlay->width -= overlay->width > overlay->left ? overlay->left : overlay->width;
   overlay->height -= overlay->height > overlay->top ? overlay->top : overlay->height;
   const float gain = (float)pow(10, gain_db / 10);
@@ -32,19 +39,20 @@ void sonde_colour_paint(sonde_colour *c, const sonde_colour_box *box, double gai
   for (uint32_t y = 0; y < overlay->height; ++y) {
     uint8_t *out = overlay->pixels + (size_t)y * overlay->width;
     const uint8_t *grey = image->pixels + (size_t)(overlay->top + y) * image->width + overlay->left;
-    const double z = (overlay->top + y + 0.5) * size,
+    const double z = image->top_m + (overlay->top + y + 0.5) * size,
                  per_line = (box->right_m - box->left_m) / LINES;
-    const double down = (z - box->top_m) / (box->bottom_m - box->top_m) * ROWS - 0.5;
-    const double x = (overlay->left + 0.5 - 0.5 * image->width) * size - z * lean;
+    double at[2] = {0, (z - box->top_m) / (box->bottom_m - box->top_m) * ROWS - 0.5};
+    const double left = (overlay->left + 0.5 - 0.5 * image->width) * size, x = left - z * lean;
     const float first = (float)((x - box->left_m) / per_line - 0.5),
                 step = (float)(size / per_line);
-    const int row = (int)clamp(floor(down), 0, ROWS - 2);
-    const float b = (float)(down - row);
     for (uint32_t n = 0; n < overlay->width; ++n) {
-      const float line = first + (float)n * step;
       out[n] = 0;
-      if (grey[n] > brightest || !(down >= 0 && down <= ROWS - 1 && line >= 0 && line <= LINES - 1))
-        continue;
+      if (grey[n] > brightest) continue;
+      float line = first + (float)n * step;
+      if (fan) sonde_colour_find(box, left + n * size, z, at), line = (float)at[0];
+      if (!(at[1] >= 0 && at[1] <= ROWS - 1 && line >= 0 && line <= LINES - 1)) continue;
+      const int row = (int)fmin(at[1], ROWS - 2);
+      const float b = (float)(at[1] - row);
       const int k = line < LINES - 2 ? (int)line : LINES - 2, cell = row * LINES + k;
       const float a = line - (float)k;
       float mean[3];

@@ -4,6 +4,7 @@
 
 #include "base/base.h"
 #include "echo/truth.h"
+#include "flow/colour.h"
 
 // A piece of a vessel between sections i and i + 1.
 typedef struct piece {
@@ -76,19 +77,25 @@ static void lay(const piece *p, sonde_pose probe, const sonde_colour_box *box,
   const sonde_vec3 at = pose_apply_inverse(probe, v_add(middle, p->offset));
   const double reach = fmax(p->low->half_long_m, p->high->half_long_m) + 0.5 * sqrt(p->length2);
   if (fabs(at.y) > reach) return;
-  const double lean = fabs(tan(box->steer_rad)) * reach + reach;
+  // Lines and depths that a ball of this reach touches.
+  const sight_lines sight = colour_sight(box);
+  const sonde_vec3 ball = sight_find(sight, at);
+  const double radius_m = sight.radius_m,
+               wide = radius_m > 0
+                          ? radius_m * asin(fmin(reach / fmax(radius_m + ball.z, reach), 1))
+                          : reach / cos(sight.steer_rad);
+  const sonde_vec3 corner[2] = {sight_place(sight, ball.x - wide, ball.z - reach),
+                                sight_place(sight, ball.x + wide, ball.z + reach)};
   double low[2], high[2];
-  sonde_colour_find(box, at.x - lean, at.z - reach, low);
-  sonde_colour_find(box, at.x + lean, at.z + reach, high);
-  if (high[0] < low[0]) high[0] = low[0];
-  const sonde_vec3 beam =
-      q_rotate(probe.rotation, vec3(sin(box->steer_rad), 0, cos(box->steer_rad)));
+  sonde_colour_find(box, corner[0].x, corner[0].z, low);
+  sonde_colour_find(box, corner[1].x, corner[1].z, high);
   const int first[2] = {(int)clamp(low[0] - 1, 0, SONDE_COLOUR_LINES),
                         (int)clamp(low[1] - 1, 0, SONDE_COLOUR_ROWS)};
   const int last[2] = {(int)clamp(high[0] + 2, 0, SONDE_COLOUR_LINES),
                        (int)clamp(high[1] + 2, 0, SONDE_COLOUR_ROWS)};
-  for (int row = first[1]; row < last[1]; ++row)
-    for (int line = first[0]; line < last[0]; ++line) {
+  for (int line = first[0]; line < last[0]; ++line) {
+    const sonde_vec3 beam = q_rotate(probe.rotation, sight_beam(sight, colour_line(box, line)));
+    for (int row = first[1]; row < last[1]; ++row) {
       sonde_colour_cell *cell = &cells[row * SONDE_COLOUR_LINES + line];
       double xz[2];
       scene_blood blood;
@@ -102,6 +109,7 @@ static void lay(const piece *p, sonde_pose probe, const sonde_colour_box *box,
                               .across_m_s = (float)sqrt(fmax(speed * speed - towards * towards, 0)),
                               .vessel = p->vessel};
     }
+  }
 }
 
 // The piece of a vessel behind its section i, laid where the picture draws it; false when it is far
@@ -129,6 +137,7 @@ static bool find_piece(const sonde_flow_scene *s, const sonde_echo *echo, double
 void sonde_flow_scene_cells(const sonde_flow_scene *s, const sonde_echo *echo,
                             const sonde_colour_box *box, sonde_colour_cell *cells) {
   SONDE_ASSERT(s && echo && box && cells);
+  SONDE_ASSERT(box->radius_m == sonde_truth_view_of(echo).radius_m);
   const sonde_interior *in = s->interior;
   for (uint32_t i = 0; i < SONDE_COLOUR_CELLS; ++i)
     cells[i] = (sonde_colour_cell){.vessel = SONDE_COLOUR_NO_VESSEL};

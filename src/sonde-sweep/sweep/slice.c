@@ -244,7 +244,8 @@ sonde_affine sonde_slice_plane(sonde_pose probe, const sonde_image *image) {
   sonde_vec3 x = q_rotate(probe.rotation, vec3(1, 0, 0));
   sonde_vec3 y = q_rotate(probe.rotation, vec3(0, 1, 0));
   sonde_vec3 z = q_rotate(probe.rotation, vec3(0, 0, 1));
-  sonde_vec3 corner = v_madd(v_madd(probe.position, 0.5 * (dx - image->width_m), x), 0.5 * dz, z);
+  sonde_vec3 corner =
+      v_madd(v_madd(probe.position, 0.5 * (dx - image->width_m), x), image->top_m + 0.5 * dz, z);
   return affine_columns(v_scale(x, dx), v_scale(z, dz), v_neg(y), corner);
 }
 

@@ -175,6 +175,7 @@ sonde_status sonde_echo_create(const sonde_interior *interior, const sonde_echo_
   made->per_piece = (made->per_cell / 8 + ECHO_ALIGN - 1) / ECHO_ALIGN * ECHO_ALIGN;
   made->rolling = def->rolling;
   status = sonde_scanner_take(made, def->scanner, error);
+  if (!status) status = sonde_echo_set_radius(made, made->scanner.radius_m, error);
   if (status) {
     sonde_free(made);
     return status;

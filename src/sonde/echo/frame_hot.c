@@ -2,6 +2,7 @@
 #include "base/base.h"
 #include "echo/bands.h"
 #include "echo/cubes.h"
+#include "echo/lines.h"
 
 #include <time.h>
 
@@ -22,15 +23,13 @@ double sonde_echo_default_tgc_db_per_m(double frequency_hz) {
 sonde_vec3 sonde_echo_place(const frame *f, double line, double depth_m) {
   double v = (line - f->first_line) * f->pitch_m;
   if (!(f->radius_m > 0)) return vec3(v, 0, depth_m);
-  double r = f->radius_m + depth_m, angle = v / f->radius_m;
-  return vec3(r * sin(angle), 0, r * cos(angle) - f->radius_m);
+  return sight_place((sight_lines){f->radius_m, 0}, v, depth_m);
 }
 
 sonde_vec3 sonde_echo_unplace(const frame *f, sonde_vec3 p) {
   if (!(f->radius_m > 0)) return vec3(p.x / f->pitch_m + f->first_line, p.y, p.z);
-  double z = p.z + f->radius_m, angle = atan2(p.x, z);
-  return vec3(angle * f->radius_m / f->pitch_m + f->first_line, p.y,
-              sqrt(p.x * p.x + z * z) - f->radius_m);
+  const sonde_vec3 at = sight_find((sight_lines){f->radius_m, 0}, p);
+  return vec3(at.x / f->pitch_m + f->first_line, at.y, at.z);
 }
 
 sonde_vec3 sonde_echo_to_world(const sonde_echo *echo, sonde_vec3 at) {

@@ -2,16 +2,17 @@
 // bicubic, with square pixels, black beside the lines.
 #include "base/base.h"
 #include "echo/echo.h"
+#include "echo/lines.h"
 
 void sonde_echo_picture(sonde_echo *echo, sonde_image *image) {
   const frame *f = &echo->frame;
   // A curved face's outer lines start higher than its middle: the picture begins there.
-  double half = 0.5 * f->aperture_m, top = 0;
-  if (f->radius_m > 0) top = f->radius_m * (cos(half / f->radius_m) - 1);
+  const double top = sight_top(f->radius_m, f->aperture_m);
   double pixel = (f->depth_m - top) / image->height;
   SONDE_ASSERT(pixel > 0);
   image->width_m = pixel * image->width;
   image->height_m = f->depth_m - top;
+  image->top_m = top;
   image->tick = sonde_interior_tick(echo->interior);
   convert_job job = {.grey = echo->grey,
                      .lines = echo->lines,

@@ -13,6 +13,12 @@ sonde_pose sonde_truth_pose(const sonde_echo *echo) {
   return echo->frame.probe;
 }
 
+sonde_truth_view sonde_truth_view_of(const sonde_echo *echo) {
+  SONDE_ASSERT(echo != NULL);
+  const frame *f = &echo->frame;
+  return (sonde_truth_view){f->radius_m, f->aperture_m, f->depth_m};
+}
+
 sonde_vec3 sonde_truth_drawn_at(const sonde_echo *echo, sonde_vec3 point_m) {
   SONDE_ASSERT(echo != NULL);
   const frame *f = &echo->frame;

@@ -21,5 +21,11 @@ SONDE_LINK bool sonde_truth_at(const sonde_echo *echo, const sonde_image *image,
 SONDE_LINK sonde_vec3 sonde_truth_drawn_at(const sonde_echo *echo, sonde_vec3 point_m);
 // The pose of the last picture. @thread of the renderer
 SONDE_LINK sonde_pose sonde_truth_pose(const sonde_echo *echo);
+// What its lines span.
+typedef struct sonde_truth_view {
+  double radius_m;            // of a curved face, 0: flat
+  double aperture_m, depth_m; // from the first line to the last along the face; from the face
+} sonde_truth_view;
+SONDE_LINK sonde_truth_view sonde_truth_view_of(const sonde_echo *echo); // @thread of the renderer
 
 #endif
