@@ -176,7 +176,7 @@ void sonde_doppler_read(const sonde_doppler *d, sonde_doppler_spectrum *out) {
     const bool kept = abs(shift) * d->def.pulse_hz / BINS >= fmax(d->def.filter_hz, 0);
     out->power[b] = kept ? power[away ? (BINS - b) % BINS : b] : 0;
   }
-  spectrum_read(out->power, out->velocity_m_s, &out->mean_m_s, &out->peak_m_s);
+  spectrum_read(out->power, out->velocity_m_s, BINS, &out->mean_m_s, &out->peak_m_s);
 }
 
 double sonde_doppler_phase_velocity(const sonde_doppler *d) {
