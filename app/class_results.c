@@ -38,10 +38,10 @@ void class_results_tell(class_results *results, const char *home, sonde_door *do
     sonde_file_printf(table, "date,learner,case,title,protocol,guidance,score,passed,right,"
                              "seconds,hints\r\n");
     for (uint32_t i = 0; i < count; ++i) {
-      sonde_door_statement(&entries[i], home, &one);
-      sonde_file_printf(one.file, "\n");
-      if (entries[i].interrupted) continue; // neither score nor answer
       const sonde_log_entry *e = &entries[i];
+      sonde_door_statement(e, home, &one);
+      sonde_file_printf(one.file, "\n");
+      if (e->interrupted) continue; // an interrupted exam has neither score nor answer
       sonde_json_begin_object(&list, NULL);
       sonde_json_put_text(&list, "id", e->id);
       sonde_json_put_text(&list, "trainee", e->trainee);

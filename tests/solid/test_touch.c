@@ -110,8 +110,8 @@ static void forces_and_stiffness_match_differences(void **state) {
     sonde_stick sticks[SONDE_TOUCH_POINTS], *stick = kind == 3 ? sticks : NULL;
     for (int p = 0; p < SONDE_TOUCH_POINTS; ++p) { // some stick, some slip, one is free
       const sonde_vec3 out = v_unit(vec3(0.1, 0.02 * p, 1), vec3(0, 0, 1));
-      const sonde_vec3 anchor = pose_apply_inverse(pose, v_madd(rest[p % 4], 0.1 * p, rest[2]));
-      sticks[p] = (sonde_stick){.anchor = anchor, .out = out, .limit_pa = 4e5 * p};
+      const sonde_vec3 foothold = pose_apply_inverse(pose, v_madd(rest[p % 4], 0.1 * p, rest[2]));
+      sticks[p] = (sonde_stick){.foothold = foothold, .out = out, .limit_pa = 4e5 * p};
     }
     double f[12], fp[12], fm[12], k[12][12], worst_f = 0, worst_k = 0, most_f = 0, most_k = 0;
     sonde_touch sum = {0};

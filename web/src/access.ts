@@ -21,9 +21,19 @@ export function takeToken(): boolean {
   return true;
 }
 
+/** A name that no other page has: 32 hexadecimal digits. */
+export const freshId = (): string => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+
+/** The program's WebSocket beside a page: this one, or that of a place of a class ("3/"). */
+export function socketAddress(client: string, place = ""): URL {
+  const at = new URL(`${place}ws?client=${client}`, location.href.replace(/^http/, "ws"));
+  at.hash = "";
+  return at;
+}
+
 /** What this page calls itself, the same after a reload: so it gets back what was its own. */
 export function clientId(): string {
-  const fresh = [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+  const fresh = freshId();
   try {
     const known = sessionStorage.getItem(CLIENT_KEY) ?? fresh;
     sessionStorage.setItem(CLIENT_KEY, known);

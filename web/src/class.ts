@@ -3,7 +3,8 @@
 import { takeToken, token } from "./access";
 import { openBoard } from "./class_board";
 import { openJoin } from "./class_join";
-import { find, recall } from "./dom";
+import { find } from "./dom";
+import { dressTheme } from "./theme";
 import { language } from "./words/language";
 
 function open(): void {
@@ -12,9 +13,7 @@ function open(): void {
   else openJoin(room);
 }
 
-// As the learner's page was left.
-const kept = recall("theme");
-if (kept) document.documentElement.dataset["theme"] = kept;
+dressTheme(); // as the learner's page was left
 document.documentElement.lang = language;
 takeToken();
 open();

@@ -1,6 +1,7 @@
 // The teacher's board: all learners live, one WebSocket each, whose frames are acknowledged a second
 // late so that a picture comes twice a second and not as often as it can.
 
+import { freshId, socketAddress } from "./access";
 import { showResults } from "./class_results";
 import { button, find, make, minutes } from "./dom";
 import { decode, type Exam, type Frame, type TextMessage } from "./protocol";
@@ -29,8 +30,6 @@ interface ClassNews {
 const NEWS_MS = 1000;
 const ACK_MS = 1000;
 const FRAME = 3;
-
-const identity = (): string => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
 
 /** What of the exam is done: places seen, presses and how many of them were good. */
 export function progressOf(exam: Exam | null): string {
@@ -103,9 +102,7 @@ class Card {
   }
 
   private listen(): void {
-    const at = new URL(`${this.learner.place}/ws?client=${identity()}`, location.href.replace(/^http/, "ws"));
-    at.hash = "";
-    const socket = new WebSocket(at, ["sonde", this.learner.token]);
+    const socket = new WebSocket(socketAddress(freshId(), `${this.learner.place}/`), ["sonde", this.learner.token]);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => (this.retry_ms = 500);
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);

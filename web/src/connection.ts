@@ -1,6 +1,6 @@
 // The WebSocket: connects, says when the connection is lost and tries again.
 
-import { clientId, isStranger, takeToken, token } from "./access";
+import { clientId, isStranger, socketAddress, takeToken, token } from "./access";
 import {
   decode,
   type ColourWish,
@@ -165,9 +165,7 @@ export class Connection {
     window.clearTimeout(this.timer);
     if (this.socket) this.socket.onclose = null;
     // Beside the page, wherever it lies: a class serves several pages on one port.
-    const at = new URL(`ws?client=${this.id}`, location.href.replace(/^http/, "ws"));
-    at.hash = "";
-    const socket = new WebSocket(at, token() ? ["sonde", token()] : ["sonde"]);
+    const socket = new WebSocket(socketAddress(this.id), token() ? ["sonde", token()] : ["sonde"]);
     let greeted = false;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {

@@ -61,10 +61,15 @@ export function ink(name: string, on: "page" | "picture" = "page"): string {
   return colour;
 }
 
-function apply(): void {
+/** Dresses the document in the theme that is kept, or in the system's. */
+export function dressTheme(): void {
   const kept = chosen();
   if (kept) document.documentElement.dataset.theme = kept;
   else delete document.documentElement.dataset.theme;
+}
+
+function apply(): void {
+  dressTheme();
   inks.clear();
   const next = theme() === "light" ? "dark" : "light";
   const button = find("theme-button");

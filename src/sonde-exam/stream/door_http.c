@@ -54,12 +54,6 @@ static bool read_name(const char *text, char name[SONDE_DOOR_NAME]) {
   return size > 0;
 }
 
-static const char *bearer(const page_request *request) {
-  static const char SCHEME[] = "Bearer ";
-  const char *field = request->field[PAGE_AUTHORIZATION];
-  return strncasecmp(field, SCHEME, sizeof SCHEME - 1) == 0 ? field + sizeof SCHEME - 1 : "";
-}
-
 // Every code, right or wrong, is looked at after a while only (door_admit): who guesses has as many
 // tries in that time as there are connections, and learns nothing from one that was pushed out.
 static void join(door_connection *c, const page_request *request) {
@@ -74,7 +68,8 @@ static void join(door_connection *c, const page_request *request) {
   }
   size_t size = 0;
   c->code[0] = 0;
-  for (const char *p = bearer(request); *p; ++p) { // as it is written on a board: abcd-efgh
+  // The code may come as it is written on a board: abcd-efgh.
+  for (const char *p = page_request_bearer(request); *p; ++p) {
     if (*p == '-' || *p == ' ') continue;
     if (size < SONDE_DOOR_CODE - 1) c->code[size] = (char)toupper((unsigned char)*p);
     if (++size < SONDE_DOOR_CODE) c->code[size] = 0;
@@ -142,7 +137,7 @@ static bool reply_text(sonde_door *door, door_connection *c, const page_request 
       [SONDE_DOOR_STATEMENTS] = {"/statements.jsonl", "application/x-ndjson"}};
   for (int i = 0; i < SONDE_DOOR_TEXTS; ++i) {
     if (strcmp(request->path, TEXTS[i].path) != 0) continue;
-    if (!page_secret_equal(door->teacher_token, bearer(request))) {
+    if (!page_secret_equal(door->teacher_token, page_request_bearer(request))) {
       atomic_fetch_add(&door->wrong, 1);
       door_refuse(c, 401, "open the teacher's address that the program printed\n");
       return true;

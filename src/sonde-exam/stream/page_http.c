@@ -98,10 +98,7 @@ static void send_file(const sonde_page_server *server, const page_file *file, pa
 // ---- who may have what
 
 static bool knows_token(const sonde_page_server *server, const page_request *request) {
-  static const char SCHEME[] = "Bearer ";
-  const char *field = request->field[PAGE_AUTHORIZATION];
-  if (strncasecmp(field, SCHEME, sizeof SCHEME - 1) != 0) return false;
-  const char *given = field + sizeof SCHEME - 1;
+  const char *given = page_request_bearer(request);
   bool learner = page_secret_equal(server->token, given);
   bool watcher = page_secret_equal(server->watcher_token, given);
   return page_secret_equal(server->teacher_token, given) || learner || watcher;

@@ -93,3 +93,9 @@ bool page_request_parameter(const page_request *request, const char *name, char 
   }
   return false;
 }
+
+const char *page_request_bearer(const page_request *request) {
+  static const char SCHEME[] = "Bearer ";
+  const char *field = request->field[PAGE_AUTHORIZATION];
+  return strncasecmp(field, SCHEME, sizeof SCHEME - 1) == 0 ? field + sizeof SCHEME - 1 : "";
+}

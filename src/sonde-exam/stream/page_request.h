@@ -34,5 +34,8 @@ int page_request_parse(const char *bytes, size_t size, page_request *request);
 // Value of a parameter of the query; false when it is absent or does not fit. @thread any
 bool page_request_parameter(const page_request *request, const char *name, char *value,
                             size_t size);
+// The secret of the field "Authorization: Bearer SECRET"; empty when the request brings none.
+// @thread any
+const char *page_request_bearer(const page_request *request);
 
 #endif

@@ -9,10 +9,7 @@
 #include "base/maths.h"
 
 sonde_quat sonde_quat_advance(sonde_quat rotation, sonde_vec3 spin, double time_s) {
-  double speed = v_norm(spin), half = 0.5 * time_s * speed;
-  double scale = half > 1e-8 ? sin(half) / speed : 0.5 * time_s;
-  sonde_quat change = {cos(half), scale * spin.x, scale * spin.y, scale * spin.z};
-  return q_unit(q_mul(change, rotation));
+  return q_unit(q_mul(q_spun(spin, time_s), rotation));
 }
 
 sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation) {
@@ -21,11 +18,7 @@ sonde_mat3 sonde_inertia_world(sonde_mat3 inertia, sonde_quat rotation) {
 }
 
 sonde_vec3 sonde_spin_between(sonde_quat from, sonde_quat to, double time_s) {
-  sonde_quat change = q_mul(to, q_conj(from));
-  double sign = change.w < 0 ? -1 : 1;
-  sonde_vec3 axis = vec3(sign * change.x, sign * change.y, sign * change.z);
-  double angle = 2 * atan2(v_norm(axis), sign * change.w);
-  return v_scale(v_unit(axis, vec3(0, 0, 1)), angle / time_s);
+  return q_spin(q_mul(to, q_conj(from)), time_s);
 }
 
 // Pose of a body's frame along its path; between two poses straight and at constant spin.

@@ -200,6 +200,7 @@ sonde_status sonde_equilibrium_place(const sonde_hexes *mesh, const sonde_probe 
   sonde_equilibrium *e = *equilibrium;
   e->shape = (sonde_touch_shape){.probe = probe, .rounding_m = def->rounding_m};
   e->start = e->pose = start;
+  e->least_load_n = sonde_equilibrium_least_load(e);
   for (uint32_t k = 0; k < e->zone_count; ++k) e->imposed[k] = def->bonded;
   if (!ball && (def->rounding_m > 0 || patch_m > 0))
     status = sonde_surface_index_create(&probe->body.hull, &e->shape.hull, error);

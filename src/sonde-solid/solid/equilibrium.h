@@ -80,7 +80,7 @@ void sonde_equilibrium_face(const sonde_equilibrium *e, const sonde_vec3 *u, uin
 void sonde_equilibrium_zone_face(const sonde_equilibrium *e, const sonde_vec3 *u, const double *v,
                                  uint32_t n, sonde_vec3 rest[4], sonde_vec3 now[4]);
 // Friction at displacements u and ways v of the zone (NULL: none). Its limits follow the pressure;
-// the anchors stay, or a step ends and slip takes them along, or all friction is forgotten.
+// the footholds stay, or a step ends and slip takes them along, or all friction is forgotten.
 typedef enum sonde_friction_look_kind {
   SONDE_FRICTION_PRESSURE,
   SONDE_FRICTION_SLIP,
@@ -88,6 +88,9 @@ typedef enum sonde_friction_look_kind {
 } sonde_friction_look_kind;
 void sonde_friction_look(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3 *u,
                          const double *v, sonde_friction_look_kind kind);
+// The least force (N) that residuals are compared with: below it rounding of the elements' forces
+// would be taken for a residual.
+double sonde_equilibrium_least_load(const sonde_equilibrium *e);
 // Solves at a pose from the state; imposed nodes go to their targets. @return false: none found
 bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
                              sonde_equilibrium_result *result);

@@ -20,11 +20,11 @@ void sonde_friction_look(sonde_equilibrium *e, sonde_pose pose, const sonde_vec3
       const bool in = sonde_touch_depth(&e->shape, x, 0, &depth, &stick->out, &bend);
       stick->limit_pa = in ? e->def.friction * stiffness * depth : 0;
       if (kind == SONDE_FRICTION_PRESSURE) continue;
-      // Skin that slips takes its anchor along; skin that is free has it where it is.
+      // Skin that slips takes its foothold along; the foothold of free skin is where the skin is.
       const sonde_vec3 pull = sonde_stick_pull(stick, x);
       const double way = v_norm(pull), most = stick->limit_pa / stiffness;
       const double share = kind == SONDE_FRICTION_FORGET || !in ? 0 : way > most ? most / way : 1;
-      stick->anchor = v_madd(x, -share, pull);
+      stick->foothold = v_madd(x, -share, pull);
     }
   }
 }

@@ -302,19 +302,23 @@ static bool search_line(sonde_equilibrium *e, sonde_pose pose, bool imposing, st
   return false;
 }
 
-bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
-                             sonde_equilibrium_result *result) {
-  SONDE_ASSERT(e != NULL && result != NULL);
-  const size_t side = 3 * (size_t)e->zone_count, first = 3 * (size_t)sonde_zone_first(e);
-  standing s;
-  double lost = 0; // forces that rounding loses, squared
+double sonde_equilibrium_least_load(const sonde_equilibrium *e) {
+  SONDE_ASSERT(e != NULL && e->def.tolerance > 0);
+  double lost = 0; // sum of the squares of the forces that rounding loses, N^2
   for (uint32_t h = 0; h < e->mesh->count; ++h) {
     sonde_vec3 rest[8], now[8], g[8];
     const double bulk_pa = corners_of(e, e->moved, h, rest, now)->bulk_pa;
     const double edge = cbrt(8 * fabs(sonde_hexahedron_gradients(rest, 0, 0, 0, g)));
     lost += pow(force_rounding * bulk_pa * edge * edge, 2);
   }
-  e->least_load_n = fmax(least_load_n, sqrt(lost) / e->def.tolerance);
+  return fmax(least_load_n, sqrt(lost) / e->def.tolerance);
+}
+
+bool sonde_equilibrium_solve(sonde_equilibrium *e, sonde_pose pose,
+                             sonde_equilibrium_result *result) {
+  SONDE_ASSERT(e != NULL && result != NULL);
+  const size_t side = 3 * (size_t)e->zone_count, first = 3 * (size_t)sonde_zone_first(e);
+  standing s;
   if (!stand(e, pose, e->moved, &s)) return false;
   for (uint32_t n = 0; n < STEPS_MOST; ++n) {
     bool imposing = false;

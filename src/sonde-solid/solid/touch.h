@@ -23,17 +23,17 @@ enum { SONDE_TOUCH_POINTS = 9 };
 // Shares of a face's corners in one of its points, and the area at rest that it stands for (m^2).
 double sonde_touch_point(const sonde_vec3 rest[4], int point, double shape[4]);
 
-// Coulomb's friction at a point, in the probe's frame. The skin sticks elastically to an anchor, as
-// stiffly as it is held off the probe, and slips where that would take more than the limit. With
+// Coulomb's friction at a point, in the probe's frame. The skin sticks elastically to a foothold,
+// as stiffly as it is held off the probe, and slips where that would take more than the limit. With
 // the limit and the way out held, it has a potential of the point's place.
 typedef struct sonde_stick {
-  sonde_vec3 anchor, out; // out: unit, the way out of the probe there
-  double limit_pa;        // coefficient of friction times pressure; 0: the point does not touch
+  sonde_vec3 foothold, out; // out: unit, the way out of the probe there
+  double limit_pa;          // coefficient of friction times pressure; 0: the point does not touch
 } sonde_stick;
 
-// How far a point of the probe's frame has been pulled from its anchor along the surface.
+// How far a point of the probe's frame has been pulled from its foothold along the surface.
 static inline sonde_vec3 sonde_stick_pull(const sonde_stick *stick, sonde_vec3 point) {
-  const sonde_vec3 way = v_sub(point, stick->anchor);
+  const sonde_vec3 way = v_sub(point, stick->foothold);
   return v_madd(way, -v_dot(way, stick->out), stick->out);
 }
 

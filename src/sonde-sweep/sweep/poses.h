@@ -19,24 +19,20 @@ enum {
   POSE_SIDE = POSE_BLOCK * POSE_AXES,
 };
 
-// pose moved by a motion in its own axes.
+// A pose that is moved by a motion in its own axes.
 static inline sonde_pose pose_moved(sonde_pose pose, const double by[POSE_AXES]) {
-  const sonde_vec3 turn = vec3(by[3], by[4], by[5]);
-  const double angle = v_norm(turn), s = angle > 1e-9 ? sin(0.5 * angle) / angle : 0.5;
-  const sonde_quat q = {cos(0.5 * angle), s * turn.x, s * turn.y, s * turn.z};
-  pose = pose_mul(pose, (sonde_pose){vec3(by[0], by[1], by[2]), q});
+  const sonde_quat turn = q_spun(vec3(by[3], by[4], by[5]), 1);
+  pose = pose_mul(pose, (sonde_pose){vec3(by[0], by[1], by[2]), turn});
   pose.rotation = q_unit(pose.rotation);
   return pose;
 }
 
-// The motion that takes a to b.
+// The motion that takes pose a to pose b.
 static inline void pose_between(sonde_pose a, sonde_pose b, double motion[POSE_AXES]) {
   const sonde_pose step = pose_mul(pose_inverse(a), b);
-  const sonde_quat q = step.rotation;
-  const sonde_vec3 axis = v_scale(vec3(q.x, q.y, q.z), q.w < 0 ? -1 : 1);
-  const double s = v_norm(axis), c = fabs(q.w), k = s > 1e-9 ? 2 * atan2(s, c) / s : 2;
+  const sonde_vec3 turn = q_spin(step.rotation, 1);
   motion[0] = step.position.x, motion[1] = step.position.y, motion[2] = step.position.z;
-  motion[3] = k * axis.x, motion[4] = k * axis.y, motion[5] = k * axis.z;
+  motion[3] = turn.x, motion[4] = turn.y, motion[5] = turn.z;
 }
 
 // Normal equations of all frames' motions and the common numbers. Frames that are at most

@@ -124,6 +124,19 @@ static inline sonde_quat q_unit(sonde_quat a) {
   if (!(n > 1e-300)) return quat_identity();
   return (sonde_quat){a.w / n, a.x / n, a.y / n, a.z / n};
 }
+// The turn that a spin (a vector of rad/s) makes in a time.
+static inline sonde_quat q_spun(sonde_vec3 spin, double time_s) {
+  double speed = v_norm(spin), half = 0.5 * time_s * speed;
+  double scale = half > 1e-8 ? sin(half) / speed : 0.5 * time_s;
+  return (sonde_quat){cos(half), scale * spin.x, scale * spin.y, scale * spin.z};
+}
+// The spin that makes a turn in a time, the shorter way round.
+static inline sonde_vec3 q_spin(sonde_quat turn, double time_s) {
+  double sign = turn.w < 0 ? -1 : 1;
+  sonde_vec3 axis = vec3(sign * turn.x, sign * turn.y, sign * turn.z);
+  double angle = 2 * atan2(v_norm(axis), sign * turn.w);
+  return v_scale(v_unit(axis, vec3(0, 0, 1)), angle / time_s);
+}
 static inline sonde_mat3 q_matrix(sonde_quat q) {
   double w = q.w, x = q.x, y = q.y, z = q.z;
   return (sonde_mat3){{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},

@@ -1,13 +1,14 @@
-// Mouths of branches: the sections whose lumen is one with that of the vein that they open into.
+// Mouths of branches. A mouth is the row of sections at a branch's end whose lumen is one with the
+// lumen of the vein that the branch opens into.
 #include "base/base.h"
 #include "interior/interior.h"
 
-// Diameters of the branch beyond the place where both walls part over which it closes with the
-// vein: the hole in that vein's wall shapes the lumen so far.
+// A mouth reaches this many diameters of the branch beyond the place where the two walls part: the
+// hole in the vein's wall shapes the branch's lumen that far.
 static const double mouth_diameters = 1;
 
-// Section of a vein that is nearest to a point at rest; distance between the point and the vein's
-// line there, beyond its ends its last section.
+// Finds the section of a vein that is nearest to a point at rest. *apart_m is the distance between
+// the point and the vein's line; beyond the line's ends it is the distance to the last section.
 static uint32_t nearest_section(const sonde_interior *in, uint32_t vein, sonde_vec3 rest_m,
                                 double *apart_m) {
   uint32_t nearest = 0;
@@ -25,9 +26,10 @@ static uint32_t nearest_section(const sonde_interior *in, uint32_t vein, sonde_v
   return nearest;
 }
 
-// From an end that lies in an earlier vein the branch is its mouth to where the walls have
-// parted and a diameter beyond. Sections of a thigh that do not advance are left out, so that its
-// branch may begin beside the vein.
+// A mouth begins at an end of the branch that lies in an earlier vein, and ends a diameter beyond
+// the place where the two walls have parted. A branch of the two-layer thigh may begin beside its
+// vein, since sections that do not advance along a course are left out; such a branch has a mouth
+// when its first section still touches the vein's wall.
 void sonde_sections_find_mouths(sonde_interior *in, uint32_t branch) {
   const uint32_t count = in->course[branch].count;
   SONDE_ASSERT(branch < in->vessel_count);
