@@ -5,10 +5,13 @@
 #include "limb/knots.h"
 #include "limb/vessels.h"
 
+#include "base/parallel.h"
+
 #include <string.h>
 
-static const double LEAST_AREA = 14e-6; // a belly of less is a tendon
-static const double MOST_SCALE = 1.25;  // muscle against its rule; fat takes what is left
+static const double LEAST_AREA = 14e-6;   // a belly of less is a tendon
+static const double MOST_SCALE = 1.25;    // muscle against its rule; fat takes what is left
+enum { MIDDLE_ROW = LIMB_CELL_ROWS / 2 }; // at the knee; both halves of the limb begin there
 
 // Fat between the muscles: which share of the section it takes at levels, and where.
 typedef struct filler {
@@ -272,6 +275,76 @@ static double filler_share(uint32_t kind, double level) {
   return share < 0.003 ? 0 : share;
 }
 
+// Makes one row. Weights begin at those of the row `from` beside it, which is made already, below
+// all others where that did not know the cell. @param from `row` itself: all begin at 0
+static void make_row(const sonde_limb *limb, uint32_t row, uint32_t from, section *s) {
+  struct limb_muscles *m = limb->muscles;
+  double level = LIMB_TOP + row * LIMB_CELL_STEP, mean = 0;
+  for (uint32_t c = 0; c < LIMB_ANGLES; ++c)
+    mean += limb_fascia_radius(limb, level, 2 * SONDE_PI * c / LIMB_ANGLES) / LIMB_ANGLES;
+  m->radius[row] = mean;
+  uint32_t at = 0;
+  for (uint32_t c = 0; c < SONDE_LIMB_MUSCLES; at += limb_muscle_table[c++].seeds) {
+    const limb_muscle *muscle = &limb_muscle_table[c];
+    uint32_t knots = 1;
+    while (knots < LIMB_SEED_KNOTS && muscle->knot[knots].place[0][1] > 0) ++knots;
+    place_seeds(limb, level, muscle->knot, knots, muscle->seeds, row, at);
+  }
+  for (uint32_t c = 0; c < LIMB_FILLERS; at += FILLERS[c++].seeds)
+    place_seeds(limb, level, FILLERS[c].knot, 3, FILLERS[c].seeds, row, at);
+  row_seeds known = {0};
+  for (uint32_t k = 0; k < m->seed_count; ++k) {
+    const uint32_t c = m->cell_of[k], muscle = c < SONDE_LIMB_MUSCLES;
+    for (int beside = -1; beside <= 1 && !known.cells[c]; ++beside) {
+      double at_level = level + beside * LIMB_CELL_STEP;
+      known.cells[c] = muscle ? limb_muscle_area(&limb->body, c, at_level) >= LEAST_AREA
+                              : filler_share(c - SONDE_LIMB_MUSCLES, at_level) > 0;
+    }
+    if (known.cells[c]) known.at[known.count] = (uint8_t)k, known.cell[known.count++] = (uint8_t)c;
+    m->seed[row][k].weight = !known.cells[c] ? -1 : row != from ? m->seed[from][k].weight : 0;
+  }
+  sample_section(limb, level, mean, s);
+  // Areas of the row: muscles by their rule times a common scale, fat for its share and for what
+  // muscle does not fill.
+  double room = s->count * s->cell_area * mean * mean;
+  double muscle = 0, share[LIMB_FILLERS], fat = 0;
+  for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) {
+    double area = limb_muscle_area(&limb->body, k, level);
+    m->target[row][k] = area < LEAST_AREA ? 0 : area;
+    muscle += m->target[row][k];
+  }
+  for (uint32_t k = 0; k < LIMB_FILLERS; ++k) {
+    share[k] = filler_share(k, level);
+    fat += share[k];
+  }
+  double scale = muscle > 0 ? (1 - fat) * room / muscle : 1;
+  double elastic = fat - share[0]; // the fat of the femoral triangle keeps its share
+  if (elastic > 0 && scale > MOST_SCALE) {
+    double more = ((1 - share[0]) * room - MOST_SCALE * muscle) / (elastic * room);
+    for (uint32_t k = 1; k < LIMB_FILLERS; ++k) share[k] *= more;
+    scale = MOST_SCALE;
+  }
+  m->scale[row] = scale;
+  for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) m->target[row][k] *= scale;
+  for (uint32_t k = 0; k < LIMB_FILLERS; ++k)
+    m->target[row][SONDE_LIMB_MUSCLES + k] = share[k] * room;
+  solve_row(m, row, &known, s);
+}
+
+// From the middle row, which is made already, row by row to the ankle (way 0) or to the top (1).
+static sonde_status make_rows(void *user, uint32_t worker, uint32_t way, const atomic_bool *stop,
+                              sonde_error *error) {
+  const sonde_limb *limb = user;
+  section *s = SONDE_NEW(section, 1);
+  (void)worker, (void)stop;
+  if (!s) return sonde_fail_memory(error);
+  for (uint32_t row = MIDDLE_ROW; row + 1 < LIMB_CELL_ROWS && way == 0; ++row)
+    make_row(limb, row + 1, row, s);
+  for (uint32_t row = MIDDLE_ROW; row > 0 && way == 1; --row) make_row(limb, row - 1, row, s);
+  sonde_free(s);
+  return SONDE_OK;
+}
+
 sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
   SONDE_ASSERT(limb && limb->bones && !limb->muscles);
   struct limb_muscles *m = limb->muscles = SONDE_NEW(struct limb_muscles, 1);
@@ -286,68 +359,17 @@ sonde_status limb_muscles_make(sonde_limb *limb, sonde_error *error) {
     for (uint32_t k = 0; k < seeds; ++k) m->cell_of[m->seed_count++] = (uint8_t)c;
     SONDE_ASSERT(seeds >= 1 && m->seed_count <= LIMB_SEEDS);
   }
-  for (uint32_t row = 0; row < LIMB_CELL_ROWS; ++row) {
-    double level = LIMB_TOP + row * LIMB_CELL_STEP, mean = 0;
-    for (uint32_t c = 0; c < LIMB_ANGLES; ++c)
-      mean += limb_fascia_radius(limb, level, 2 * SONDE_PI * c / LIMB_ANGLES) / LIMB_ANGLES;
-    m->radius[row] = mean;
-    uint32_t at = 0;
-    for (uint32_t c = 0; c < SONDE_LIMB_MUSCLES; at += limb_muscle_table[c++].seeds) {
-      const limb_muscle *muscle = &limb_muscle_table[c];
-      uint32_t knots = 1;
-      while (knots < LIMB_SEED_KNOTS && muscle->knot[knots].place[0][1] > 0) ++knots;
-      place_seeds(limb, level, muscle->knot, knots, muscle->seeds, row, at);
-    }
-    for (uint32_t c = 0; c < LIMB_FILLERS; at += FILLERS[c++].seeds)
-      place_seeds(limb, level, FILLERS[c].knot, 3, FILLERS[c].seeds, row, at);
-    // Weights begin at those of the row above, below all others where that did not know the cell.
-    row_seeds known = {0};
-    for (uint32_t k = 0; k < m->seed_count; ++k) {
-      const uint32_t c = m->cell_of[k], muscle = c < SONDE_LIMB_MUSCLES;
-      for (int beside = -1; beside <= 1 && !known.cells[c]; ++beside) {
-        double at_level = level + beside * LIMB_CELL_STEP;
-        known.cells[c] = muscle ? limb_muscle_area(&limb->body, c, at_level) >= LEAST_AREA
-                                : filler_share(c - SONDE_LIMB_MUSCLES, at_level) > 0;
-      }
-      if (known.cells[c])
-        known.at[known.count] = (uint8_t)k, known.cell[known.count++] = (uint8_t)c;
-      m->seed[row][k].weight = !known.cells[c] ? -1 : row ? m->seed[row - 1][k].weight : 0;
-    }
-    sample_section(limb, level, mean, s);
-    // Areas of the row: muscles by their rule times a common scale, fat for its share and for what
-    // muscle does not fill.
-    double room = s->count * s->cell_area * mean * mean;
-    double muscle = 0, share[LIMB_FILLERS], fat = 0;
-    for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) {
-      double area = limb_muscle_area(&limb->body, k, level);
-      m->target[row][k] = area < LEAST_AREA ? 0 : area;
-      muscle += m->target[row][k];
-    }
-    for (uint32_t k = 0; k < LIMB_FILLERS; ++k) {
-      share[k] = filler_share(k, level);
-      fat += share[k];
-    }
-    double scale = muscle > 0 ? (1 - fat) * room / muscle : 1;
-    double elastic = fat - share[0]; // the fat of the femoral triangle keeps its share
-    if (elastic > 0 && scale > MOST_SCALE) {
-      double more = ((1 - share[0]) * room - MOST_SCALE * muscle) / (elastic * room);
-      for (uint32_t k = 1; k < LIMB_FILLERS; ++k) share[k] *= more;
-      scale = MOST_SCALE;
-    }
-    m->scale[row] = scale;
-    for (uint32_t k = 0; k < SONDE_LIMB_MUSCLES; ++k) m->target[row][k] *= scale;
-    for (uint32_t k = 0; k < LIMB_FILLERS; ++k)
-      m->target[row][SONDE_LIMB_MUSCLES + k] = share[k] * room;
-    solve_row(m, row, &known, s);
-  }
+  make_row(limb, MIDDLE_ROW, MIDDLE_ROW, s);
+  sonde_free(s);
+  sonde_status status =
+      sonde_parallel_run(2, sonde_parallel_workers(0, 2), make_rows, limb, NULL, "", error);
   for (uint32_t row = 0; row + 1 < LIMB_CELL_ROWS; ++row)
     for (uint32_t k = 0; k < m->seed_count; ++k) {
       uint32_t c = m->cell_of[k];
       if (m->target[row][c] > 0 || m->target[row + 1][c] > 0)
         m->active[row][m->active_count[row]++] = (uint8_t)k;
     }
-  sonde_free(s);
-  return SONDE_OK;
+  return status;
 }
 
 limb_row limb_row_at(const struct limb_muscles *m, double level) {

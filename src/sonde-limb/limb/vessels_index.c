@@ -2,6 +2,8 @@
 // nearest to a point of the leaf, or within the width of a rounded joint of the nearest.
 #include "limb/vessels_graph.h"
 
+#include "base/parallel.h"
+
 #include <string.h>
 
 enum { LEAF_PIECES = 24, DEEPEST = 7, COARSE = 6 };
@@ -48,12 +50,15 @@ typedef struct rows {
   float *number[NUMBERS];  // [count] each
 } rows;
 
+// A part of the tree that one thread makes: the whole, or what lies below one of the root's cubes.
 typedef struct growing {
-  struct limb_vessels *v;
-  uint32_t cell_room, list_room, deepest;
+  vessel_cell *cell;
+  uint32_t *listed; // pieces of the leaves
+  uint32_t cells, cell_room, listed_count, list_room, deepest;
   rows level[DEEPEST + 1]; // of the cells on the way down
   float *distance;         // [pieces] of the rows of a cell
   uint32_t *kept;          // [pieces] rows
+  void *memory[2];         // what level, distance and kept lie in
   bool failed;
 } growing;
 
@@ -82,9 +87,9 @@ static void measure_rows(const rows *r, sonde_vec3 at, float *restrict distance)
   }
 }
 
-// Keeps of the level's pieces those that count in a cube of centre `middle` and half edge `half`.
-static void split(growing *g, uint32_t cell, sonde_vec3 middle, double half, uint32_t depth) {
-  struct limb_vessels *v = g->v;
+// Keeps of the level's pieces those that count in a cube of centre `middle` and half edge `half`:
+// in the cell's list, or, for a cube with children, in the next level. @return whether it has them
+static bool split(growing *g, uint32_t cell, sonde_vec3 middle, double half, uint32_t depth) {
   const rows *from = &g->level[depth];
   const double reach = half * sqrt(3.0) + ROUNDED_M;
   const float *d = g->distance;
@@ -105,26 +110,108 @@ static void split(growing *g, uint32_t cell, sonde_vec3 middle, double half, uin
     if (!nerves) vessels = n;
   }
   if (depth >= g->deepest || n <= LEAF_PIECES || (n <= FAR_PIECES && (double)least > FAR * reach)) {
-    if (reserve(g, (void **)(void *)&v->listed, &g->list_room, v->listed_count + n,
-                sizeof *v->listed)) {
-      v->cell[cell] = (vessel_cell){0, v->listed_count, n, (float)((double)least - reach)};
-      for (uint32_t k = 0; k < n; ++k) v->listed[v->listed_count++] = from->piece[g->kept[k]];
-    }
-  } else if (reserve(g, (void **)(void *)&v->cell, &g->cell_room, v->cells + 8, sizeof *v->cell)) {
-    uint32_t child = v->cells;
-    v->cell[cell] = (vessel_cell){child, 0, 0, 0};
-    v->cells += 8;
-    rows *to = &g->level[depth + 1];
-    to->count = n, to->vessels = vessels;
-    for (uint32_t k = 0; k < n; ++k) to->piece[k] = from->piece[g->kept[k]];
-    for (int i = 0; i < NUMBERS; ++i)
-      for (uint32_t k = 0; k < n; ++k) to->number[i][k] = from->number[i][g->kept[k]];
-    for (uint32_t k = 0; k < 8 && !g->failed; ++k) {
-      double h = 0.5 * half;
-      sonde_vec3 at = v_add(middle, vec3(k & 1 ? h : -h, k & 2 ? h : -h, k & 4 ? h : -h));
-      split(g, child + k, at, h, depth + 1);
-    }
+    if (!reserve(g, (void **)(void *)&g->listed, &g->list_room, g->listed_count + n,
+                 sizeof *g->listed))
+      return false;
+    g->cell[cell] = (vessel_cell){0, g->listed_count, n, (float)((double)least - reach)};
+    for (uint32_t k = 0; k < n; ++k) g->listed[g->listed_count++] = from->piece[g->kept[k]];
+    return false;
   }
+  if (!reserve(g, (void **)(void *)&g->cell, &g->cell_room, g->cells + 8, sizeof *g->cell))
+    return false;
+  g->cell[cell] = (vessel_cell){g->cells, 0, 0, 0};
+  g->cells += 8;
+  rows *to = &g->level[depth + 1];
+  to->count = n, to->vessels = vessels;
+  for (uint32_t k = 0; k < n; ++k) to->piece[k] = from->piece[g->kept[k]];
+  for (int i = 0; i < NUMBERS; ++i)
+    for (uint32_t k = 0; k < n; ++k) to->number[i][k] = from->number[i][g->kept[k]];
+  return true;
+}
+
+// Middle of one of the eight cubes of a cube of centre `middle` and half edge `half`.
+static sonde_vec3 middle_of(sonde_vec3 middle, double half, uint32_t k) {
+  const double h = 0.5 * half;
+  return v_add(middle, vec3(k & 1 ? h : -h, k & 2 ? h : -h, k & 4 ? h : -h));
+}
+
+static void grow(growing *g, uint32_t cell, sonde_vec3 middle, double half, uint32_t depth) {
+  if (!split(g, cell, middle, half, depth)) return;
+  const uint32_t child = g->cell[cell].child;
+  for (uint32_t k = 0; k < 8 && !g->failed; ++k)
+    grow(g, child + k, middle_of(middle, half, k), 0.5 * half, depth + 1);
+}
+
+// Room for `count` rows in the levels from `first` on and a first cell.
+static void begin(growing *g, uint32_t first, uint32_t deepest, uint32_t count) {
+  const uint32_t levels = deepest + 1 - first;
+  uint32_t *piece = SONDE_NEW(uint32_t, (size_t)(levels + 1) * count);
+  float *number = SONDE_NEW(float, ((size_t)levels * NUMBERS + 1) * count);
+  *g = (growing){.deepest = deepest, .cells = 1, .memory = {piece, number}};
+  g->failed = !piece || !number ||
+              !reserve(g, (void **)(void *)&g->cell, &g->cell_room, 1, sizeof *g->cell);
+  if (g->failed) return;
+  for (uint32_t k = 0; k < levels; ++k) {
+    g->level[first + k] = (rows){.piece = piece + (size_t)k * count};
+    for (uint32_t i = 0; i < NUMBERS; ++i)
+      g->level[first + k].number[i] = number + (size_t)(k * NUMBERS + i) * count;
+  }
+  g->kept = piece + (size_t)levels * count, g->distance = number + (size_t)levels * NUMBERS * count;
+}
+
+static void end_levels(growing *g) {
+  sonde_free(g->memory[0]);
+  sonde_free(g->memory[1]);
+  g->memory[0] = g->memory[1] = NULL;
+}
+
+static void end(growing *g) {
+  end_levels(g);
+  sonde_free(g->cell);
+  sonde_free(g->listed);
+}
+
+// The whole tree: its root and the parts below the root's cubes, one thread a part.
+typedef struct tree {
+  growing root, part[8];
+  sonde_vec3 middle;
+  double half;
+} tree;
+
+static sonde_status grow_part(void *user, uint32_t worker, uint32_t k, const atomic_bool *stop,
+                              sonde_error *error) {
+  tree *t = user;
+  growing *g = &t->part[k];
+  (void)worker, (void)stop;
+  begin(g, 2, t->root.deepest, t->root.level[1].count);
+  g->level[1] = t->root.level[1];
+  if (!g->failed) grow(g, 0, middle_of(t->middle, t->half, k), 0.5 * t->half, 1);
+  end_levels(g);
+  return g->failed ? sonde_fail_memory(error) : SONDE_OK;
+}
+
+// Lays the parts behind the root and its eight children, whose cells are the parts' first ones.
+static sonde_status join_parts(struct limb_vessels *v, tree *t, sonde_error *error) {
+  uint32_t cells = 1, listed = 0;
+  for (uint32_t k = 0; k < 8; ++k) cells += t->part[k].cells, listed += t->part[k].listed_count;
+  v->cell = SONDE_NEW(vessel_cell, cells), v->listed = SONDE_NEW(uint32_t, listed);
+  if (!v->cell || !v->listed) return sonde_fail_memory(error);
+  v->cell[0] = (vessel_cell){.child = 1};
+  v->cells = 9, v->listed_count = 0;
+  for (uint32_t k = 0; k < 8; ++k) {
+    const growing *g = &t->part[k];
+    for (uint32_t i = 0; i < g->cells; ++i) {
+      vessel_cell cell = g->cell[i];
+      if (cell.child)
+        cell.child += v->cells - 1;
+      else
+        cell.first += v->listed_count;
+      v->cell[i ? v->cells + i - 1 : 1 + k] = cell;
+    }
+    for (uint32_t i = 0; i < g->listed_count; ++i) v->listed[v->listed_count + i] = g->listed[i];
+    v->cells += g->cells - 1, v->listed_count += g->listed_count;
+  }
+  return SONDE_OK;
 }
 
 sonde_status limb_vessels_index(struct limb_vessels *v, bool fine, sonde_error *error) {
@@ -157,21 +244,15 @@ sonde_status limb_vessels_index(struct limb_vessels *v, bool fine, sonde_error *
          edge = most_of(high.z - low.z, most_of(high.x - low.x, high.y - low.y)) + 2 * margin;
   v->low = v_sub(v_scale(v_add(low, high), 0.5), vec3(edge / 2, edge / 2, edge / 2));
   v->edge = edge;
-  growing g = {.v = v, .deepest = fine ? DEEPEST : COARSE};
-  const uint32_t levels = g.deepest + 1, count = v->pieces;
-  uint32_t *piece = SONDE_NEW(uint32_t, (size_t)(levels + 1) * count);
-  float *number = SONDE_NEW(float, ((size_t)levels * NUMBERS + 1) * count);
-  g.failed = !piece || !number ||
-             !reserve(&g, (void **)(void *)&v->cell, &g.cell_room, 1, sizeof *v->cell);
-  if (!g.failed) {
-    for (uint32_t k = 0; k < levels; ++k) {
-      g.level[k] = (rows){.piece = piece + (size_t)k * count};
-      for (uint32_t i = 0; i < NUMBERS; ++i)
-        g.level[k].number[i] = number + (size_t)(k * NUMBERS + i) * count;
-    }
-    g.kept = piece + (size_t)levels * count, g.distance = number + (size_t)levels * NUMBERS * count;
-    rows *all = &g.level[0];
-    for (uint32_t k = 0; k < count; ++k) {
+  tree *t = SONDE_NEW(tree, 1);
+  if (!t) return sonde_fail_memory(error);
+  growing *root = &t->root;
+  sonde_status status = SONDE_OK;
+  t->half = edge / 2, t->middle = v_add(v->low, vec3(t->half, t->half, t->half));
+  begin(root, 0, fine ? DEEPEST : COARSE, v->pieces);
+  if (!root->failed) {
+    rows *all = &root->level[0];
+    for (uint32_t k = 0; k < v->pieces; ++k) {
       const vessel_piece *p = &v->piece[k];
       const double of[NUMBERS] = {p->a.x,     p->a.y,     p->a.z,    p->along.x, p->along.y,
                                   p->along.z, p->inverse, p->radius, p->grows,   p->half,
@@ -179,13 +260,18 @@ sonde_status limb_vessels_index(struct limb_vessels *v, bool fine, sonde_error *
       for (int i = 0; i < NUMBERS; ++i) all->number[i][k] = (float)of[i];
       all->piece[k] = k, all->vessels += p->owner < v->branches;
     }
-    all->count = count;
-    v->cells = 1;
-    split(&g, 0, v_add(v->low, vec3(edge / 2, edge / 2, edge / 2)), edge / 2, 0);
+    all->count = v->pieces;
+    const bool parts = split(root, 0, t->middle, t->half, 0);
+    SONDE_ASSERT(parts || root->failed); // a limb has more pieces than a leaf
+    if (!root->failed)
+      status = sonde_parallel_run(8, sonde_parallel_workers(0, 8), grow_part, t, NULL, "", error);
+    if (!root->failed && !status) status = join_parts(v, t, error);
+    for (uint32_t k = 0; k < 8; ++k) end(&t->part[k]);
   }
-  sonde_free(piece);
-  sonde_free(number);
-  return g.failed ? sonde_fail_memory(error) : SONDE_OK;
+  if (root->failed) status = sonde_fail_memory(error);
+  end(root);
+  sonde_free(t);
+  return status;
 }
 
 // ---- asking -------------------------------------------------------------------------------------
