@@ -25,8 +25,10 @@ static const char *const METHODS[] = {
     [SONDE_RECONSTRUCT_LINEAR] = "linear", [SONDE_RECONSTRUCT_NEAREST] = "nearest", NULL};
 
 static const app_option TABLE[] = {
-    OPT_ARGUMENT(sequence, "SEQUENCE",
-                 "tracked frames: .igs.mha, .igs.nrrd or .seq.nrrd; 8-bit grey, raw or compressed"),
+    OPT_ARGUMENT(
+        sequence, "SEQUENCE",
+        "tracked frames: .igs.mha, .igs.nrrd, .seq.nrrd or, as TUS-REC has them, .h5; 8-bit "
+        "grey, raw or compressed"),
     OPT_OUTPUT(output, "o", "FILE",
                "the volume, .mha or .nrrd; voxels that no frame reaches are 0"),
     OPT_FLAG(leave_one_out, "leave-one-out",
@@ -171,7 +173,7 @@ static sonde_status volume(const options *a, sonde_sequence *s, const sonde_loca
 
 static sonde_status copy(const options *a, sonde_error *error) {
   sonde_sequence s;
-  sonde_status status = sonde_sequence_load(a->sequence, &s, error);
+  sonde_status status = frames_read(a->sequence, &s, error);
   if (!status) status = sonde_sequence_save(a->copy, &s, !a->raw, error);
   if (!status && a->json) {
     app_json_begin();

@@ -56,7 +56,8 @@ typedef struct work {
 
 static const app_option TABLE[] = {
     OPT_ARGUMENT(input, "SEQUENCE|VOLUME",
-                 "names that end in .igs.mha, .igs.nrrd, .seq.mha and .seq.nrrd are sequences of "
+                 "names that end in .igs.mha, .igs.nrrd, .seq.mha, .seq.nrrd, .h5 and .hdf5 are "
+                 "sequences of "
                  "tracked frames, others volumes"),
     OPT_NUMBERS(pose, "pose", "X,Y,Z,QW,QX,QY,QZ", -INFINITY, INFINITY,
                 "the probe's origin in mm and its rotation; the picture is its x-z "
@@ -87,7 +88,8 @@ static const app_option TABLE[] = {
     OPT_JSON(json)};
 
 static int check(void *from) {
-  static const char *const ENDS[] = {".igs.mha", ".igs.nrrd", ".seq.mha", ".seq.nrrd"};
+  static const char *const ENDS[] = {".igs.mha",  ".igs.nrrd", ".seq.mha",
+                                     ".seq.nrrd", ".h5",       ".hdf5"};
   static const char *const METHODS[2][3] = {{"both", "nearest", "krige"}, {"linear", "nearest"}};
   options *o = from;
   bool posed = app_option_given("pose");

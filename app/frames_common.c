@@ -1,10 +1,13 @@
 // Loading a sequence with its poses, and the options that say which part of it.
 #include "frames_common.h"
 
+#include "frames_hdf5.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 bool frames_numbers(const char *text, int count, char separator, double *values) {
   for (int k = 0; k < count; ++k) {
@@ -19,6 +22,12 @@ bool frames_numbers(const char *text, int count, char separator, double *values)
 
 static bool whole(double value, double low, double high) {
   return value >= low && value <= high && floor(value) == value;
+}
+
+sonde_status frames_read(const char *path, sonde_sequence *s, sonde_error *error) {
+  const char *end = strrchr(path, '.');
+  const bool hdf5 = end && (strcmp(end, ".h5") == 0 || strcmp(end, ".hdf5") == 0);
+  return hdf5 ? frames_hdf5_load(path, s, error) : sonde_sequence_load(path, s, error);
 }
 
 sonde_status frames_load(const char *path, const frames_options *o, sonde_sequence *s,
@@ -39,7 +48,7 @@ sonde_status frames_load(const char *path, const frames_options *o, sonde_sequen
     return app_error(error, SONDE_ARGUMENT, "--clip expects X,Y,W,H in whole pixels, got '%.60s'",
                      o->clip);
   c.has_clip |= o->clip != NULL;
-  status = sonde_sequence_load(path, s, error);
+  status = frames_read(path, s, error);
   if (!status) status = sonde_sequence_locate(s, &c, o->world, located, error);
   if (status || !o->range) return status;
 

@@ -15,7 +15,8 @@ typedef struct frames_options {
 // NOLINTBEGIN(bugprone-macro-parentheses): offsetof() takes no parentheses around a member
 #define FRAMES_OPTIONS(m)                                                                          \
   OPT_TEXT(m.config, "config", "FILE",                                                             \
-           "PLUS configuration (XML) with the ImageToProbe transform and the clip rectangle"),     \
+           "PLUS configuration (XML) with the ImageToProbe transform and the clip rectangle, or "  \
+           "TUS-REC's calib_matrix.csv"),                                                          \
       OPT_TEXT(m.world, "world", "NAME",                                                           \
                "frame of reference of the poses; default the first of Reference, Tracker, World "  \
                "and Probe that the transforms reach"),                                             \
@@ -35,6 +36,8 @@ sonde_status frames_refine(const frames_options *options, uint32_t left_out,
                            sonde_error *error);
 // Prints them, or puts them into the JSON under way; nothing without frames.
 void frames_show(const sonde_pose_findings *findings, bool json);
+// Reads a sequence by its name's end: HDF5, else what sonde_sequence_load() reads.
+sonde_status frames_read(const char *path, sonde_sequence *sequence, sonde_error *error);
 // Loads, clips, locates and keeps the range; SONDE_ARGUMENT for options that do not fit.
 sonde_status frames_load(const char *path, const frames_options *options, sonde_sequence *sequence,
                          sonde_located *located, sonde_error *error);

@@ -88,8 +88,8 @@ typedef struct sonde_calibration {
   uint32_t clip[4];
 } sonde_calibration;
 
-/** Reads the Transform elements and the clip rectangle of a PLUS configuration (XML).
- *  @thread owner */
+/** Reads the Transform elements and the clip rectangle of a PLUS configuration (XML), or the two
+ *  matrices of a TUS-REC calib_matrix.csv. @thread owner */
 SONDE_API sonde_status sonde_calibration_load(const char *path, sonde_calibration *calibration,
                                               sonde_error *error);
 

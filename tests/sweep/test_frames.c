@@ -349,6 +349,37 @@ static void calibration_is_read_or_named(void **state) {
   assert_non_null(strstr(error.message, "c.xml:3:"));
 }
 
+// TUS-REC's two blocks: pixels count from 1 there, so that its pixel (1, 1) is ours (0, 0).
+static void blocks_of_numbers_calibrate(void **state) {
+  (void)state;
+  static const char good[] =
+      "scaling_from_pixel_to_mm,,,\r\n0.2,0,0,0\r\n0,0.5,0,0\r\n0,0,1,0\r\n0,0,0,1\r\n"
+      "spatial_calibration_from_image_coordinate_system_to_tracking_tool_coordinate_system,,,\r\n"
+      "0,-1,0,10\r\n1,0,0,20\r\n0,0,1,30\r\n0,0,0,1";
+  sonde_calibration c;
+  sonde_error error;
+  write_bytes("calib_matrix.csv", good, sizeof good - 1);
+  assert_int_equal(sonde_calibration_load(path_of("calib_matrix.csv"), &c, NULL), SONDE_OK);
+  assert_int_equal(c.count, 1);
+  assert_false(c.has_clip);
+  assert_string_equal(c.transforms[0].from, "Image");
+  assert_string_equal(c.transforms[0].to, "Probe");
+  const double expected[3][4] = {{0, -0.5, 0, 9.5}, {0.2, 0, 0, 20.2}, {0, 0, 1, 30}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 4; ++j)
+      assert_near(c.transforms[0].to_from_from.m[i][j], expected[i][j], 1e-15);
+  static const char *const bad[] = {
+      "scaling_from_pixel_to_mm\n1,0,0,0\n0,1,0\n0,0,1,0\n0,0,0,1\n",
+      "scaling_from_pixel_to_mm\n1,0,0,0\n0,1,0,0\n0,0,1,0\n0,0,0,2\n",
+      "scaling_from_pixel_to_mm\n1,0,0,0\n0,1,0,0\n0,0,1,0\n0,0,0,1\n", // the other is missing
+      "scaling_from_pixel_to_mm", "1,0,0,0\n"};
+  for (size_t k = 0; k < SONDE_COUNT_OF(bad); ++k) {
+    write_bytes("bad.csv", bad[k], strlen(bad[k]));
+    assert_int_equal(sonde_calibration_load(path_of("bad.csv"), &c, &error), SONDE_FORMAT);
+    assert_non_null(strstr(error.message, k < 4 ? "bad.csv:" : "calib_matrix.csv"));
+  }
+}
+
 static void volumes_are_read_back(void **state) {
   (void)state;
   const char *const names[] = {"v.mha", "v.nrrd"};
@@ -501,6 +532,7 @@ int main(void) {
                                      cmocka_unit_test(invalid_frames_are_kept_and_not_used),
                                      cmocka_unit_test(a_picture_keeps_its_plane),
                                      cmocka_unit_test(calibration_is_read_or_named),
+                                     cmocka_unit_test(blocks_of_numbers_calibrate),
                                      cmocka_unit_test(volumes_are_read_back),
                                      cmocka_unit_test(every_failed_allocation_is_reported),
                                      cmocka_unit_test(both_formats_of_a_recording_agree),

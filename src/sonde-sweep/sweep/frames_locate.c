@@ -42,6 +42,45 @@ static bool attribute(const char *element, const char *end, const char *name, ch
   return false;
 }
 
+static const char *const BLOCKS[] = {
+    "scaling_from_pixel_to_mm",
+    "spatial_calibration_from_image_coordinate_system_to_tracking_tool_coordinate_system"};
+
+// Two blocks of four lines of four numbers, each below a line with its name, as the TUS-REC data
+// sets bring them: mm from pixels, which count from 1 there, and the probe's tool from these mm.
+static sonde_status load_blocks(const char *path, const char *text, sonde_calibration *c,
+                                sonde_error *error) {
+  sonde_affine block[2];
+  for (int b = 0; b < 2; ++b) {
+    const char *at = strstr(text, BLOCKS[b]), *end;
+    double v[4][4];
+    bool good = at != NULL;
+    for (int row = 0; row < 4 && good; ++row) {
+      at = strchr(at, '\n');
+      good = at != NULL;
+      for (int k = 0; k < 4 && good; ++k) {
+        v[row][k] = sonde_parse_real(++at, &end);
+        good = end != at && isfinite(v[row][k]) && (k == 3 || *end == ',');
+        at = end;
+      }
+    }
+    good = good && v[3][0] == 0 && v[3][1] == 0 && v[3][2] == 0 && v[3][3] == 1;
+    if (!good)
+      return sonde_fail(error, SONDE_FORMAT,
+                        "%.200s:%u: expected four lines of four numbers each below %s, the last "
+                        "one 0,0,0,1",
+                        path, at ? sonde_line_of(text, at) : 1, BLOCKS[b]);
+    memcpy(block[b].m, v, sizeof block[b].m);
+  }
+  const sonde_affine from_zero = {{{1, 0, 0, 1}, {0, 1, 0, 1}, {0, 0, 1, 0}}};
+  const sonde_affine mm = affine_mul(&block[0], &from_zero);
+  c->count = 1;
+  snprintf(c->transforms[0].from, NAME_MAX_BYTES, "Image");
+  snprintf(c->transforms[0].to, NAME_MAX_BYTES, "Probe");
+  c->transforms[0].to_from_from = affine_mul(&block[1], &mm);
+  return SONDE_OK;
+}
+
 sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sonde_error *error) {
   SONDE_ASSERT(path != NULL && c != NULL);
   *c = (sonde_calibration){0};
@@ -49,6 +88,11 @@ sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sond
   size_t count;
   sonde_status status = sonde_bounded_load_text(path, &sonde_limits_xml, &bytes, &count, error);
   if (status) return status;
+  if (strstr(bytes, BLOCKS[0])) {
+    status = load_blocks(path, bytes, c, error);
+    sonde_free(bytes);
+    return status;
+  }
   // Only elements that begin with these names matter; comments are skipped.
   const char *stop = bytes + count, *end;
   for (const char *at = bytes; !status && (at = memchr(at, '<', (size_t)(stop - at))); at = end) {
@@ -94,7 +138,9 @@ sonde_status sonde_calibration_load(const char *path, sonde_calibration *c, sond
   }
   if (!status && c->count == 0)
     status = sonde_fail(error, SONDE_FORMAT,
-                        "%.200s: expected at least one <Transform From To Matrix>", path);
+                        "%.200s: expected at least one <Transform From To Matrix> of a PLUS "
+                        "configuration, or TUS-REC's calib_matrix.csv",
+                        path);
   sonde_free(bytes);
   return status;
 }
