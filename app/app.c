@@ -84,8 +84,6 @@ bool app_parse_integer(const char *verb, const char *option, const char *text, l
 
 // ---- bundled model
 
-#define MODEL_UNDER_PREFIX "share/sonde/thigh.sonde"
-
 // Directory two levels above the program: the build or install prefix; false when unknown.
 static bool own_prefix(char *path, size_t size) {
   if (app_program(path, size)) return false;
@@ -99,32 +97,40 @@ static bool own_prefix(char *path, size_t size) {
 
 static bool is_readable(const char *path) { return access(path, R_OK) == 0; }
 
-bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_size) {
-  const char *chosen = getenv("SONDE_MODEL");
-  if (chosen && chosen[0]) { // what the user asks for is not replaced by something else
-    snprintf(path, size, "%s", chosen);
-    snprintf(searched, searched_size, "%s (from SONDE_MODEL)", chosen);
-    return is_readable(path);
-  }
+// A file or directory of share/sonde, below the own prefix or the one of the installation; path:
+// the last place looked at, searched: all of them, may be NULL.
+static bool find_shared(const char *name, char *path, size_t size, char *searched,
+                        size_t searched_size) {
   char prefix[4096] = "";
   if (own_prefix(prefix, sizeof prefix)) {
-    snprintf(path, size, "%.3000s/%s", prefix, MODEL_UNDER_PREFIX);
+    snprintf(path, size, "%.3000s/share/sonde/%s", prefix, name);
     if (is_readable(path)) return true;
   }
-  snprintf(searched, searched_size, "%.3000s/%s, %s/%s", prefix, MODEL_UNDER_PREFIX,
-           SONDE_INSTALL_PREFIX, MODEL_UNDER_PREFIX);
-  snprintf(path, size, "%s/%s", SONDE_INSTALL_PREFIX, MODEL_UNDER_PREFIX);
+  if (searched)
+    snprintf(searched, searched_size, "%.3000s/share/sonde/%s, %s/share/sonde/%s", prefix, name,
+             SONDE_INSTALL_PREFIX, name);
+  snprintf(path, size, "%s/share/sonde/%s", SONDE_INSTALL_PREFIX, name);
   return is_readable(path);
 }
 
-bool app_data_directory(const char *name, char *path, size_t size) {
-  char prefix[4096] = "";
-  if (own_prefix(prefix, sizeof prefix)) {
-    snprintf(path, size, "%.3000s/share/sonde/data/%s", prefix, name);
-    if (is_readable(path)) return true;
-  }
-  snprintf(path, size, "%s/share/sonde/data/%s", SONDE_INSTALL_PREFIX, name);
+bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_size) {
+  const char *chosen = getenv("SONDE_MODEL");
+  if (!chosen || !chosen[0]) return find_shared("thigh.sonde", path, size, searched, searched_size);
+  // What the user asks for is not replaced by something else.
+  snprintf(path, size, "%s", chosen);
+  snprintf(searched, searched_size, "%s (from SONDE_MODEL)", chosen);
   return is_readable(path);
+}
+
+bool app_bundled_leg(char *path, size_t size) {
+  const char *chosen = getenv("SONDE_MODEL");
+  return (!chosen || !chosen[0]) && find_shared("leg.sonde", path, size, NULL, 0);
+}
+
+bool app_data_directory(const char *name, char *path, size_t size) {
+  char below[256];
+  snprintf(below, sizeof below, "data/%s", name);
+  return find_shared(below, path, size, NULL, 0);
 }
 
 double app_seconds(clockid_t clock) {

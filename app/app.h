@@ -49,6 +49,10 @@ bool app_interrupted(void);
 // false when there is none; then *searched names the places.
 bool app_bundled_model(char *path, size_t size, char *searched, size_t searched_size);
 
+// Path of the bundled leg, found as the bundled model is; false when there is none, or SONDE_MODEL
+// names a model instead.
+bool app_bundled_leg(char *path, size_t size);
+
 // A clock of the system in seconds.
 double app_seconds(clockid_t clock);
 // Order statistic: the value that `share` (0..1) of the list does not exceed. Sorts the list; NaN

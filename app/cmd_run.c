@@ -150,11 +150,16 @@ static sonde_status serve_igtl(const options *s, sonde_session_def *def, sonde_e
 }
 
 static int check(void *from) {
+  static char leg[4096];
   options *s = from;
   if ((app_option_given("seconds") || s->lockstep || s->json) && !s->headless)
     return app_usage_error("run", "--seconds, --lockstep and --json need --headless");
   if (s->compare && !s->preset)
     return app_usage_error("run", "--compare needs a --preset to compare with");
+  // A page practises on a whole leg; a place that is named and recorded poses are the thigh's.
+  if (!s->model && !s->headless && !s->device.at && !s->device.from &&
+      app_bundled_leg(leg, sizeof leg))
+    s->model = leg;
   s->device.headless = s->headless;
   s->device.lockstep = s->lockstep;
   s->device.seconds = s->headless ? s->seconds : 3600.0;
@@ -469,9 +474,11 @@ const app_command cmd_run = {
     .summary = "simulate in real time and serve the page",
     .usage = "[MODEL] [options]\n"
              "[MODEL] --headless [--seconds S] [--lockstep] [--json] [options]",
-    .text =
-        "Simulates compression ultrasound of a thigh at 1 kHz and serves the page that shows it "
-        "on 127.0.0.1. Ctrl-C stops.",
+    .text = "Simulates compression ultrasound of a leg at 1 kHz and serves the page that shows it "
+            "on 127.0.0.1. Ctrl-C stops.",
+    .tail =
+        "In the page it is the bundled leg, from groin to ankle, unless --site names a place of "
+        "the thigh.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .defaults = &DEFAULTS,

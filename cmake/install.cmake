@@ -46,7 +46,7 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/data/thigh ${PROJECT_SOURCE_DIR}/data/sc
   ${PROJECT_SOURCE_DIR}/data/openigtlink
   DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde/data)
 if(TARGET thigh)
-  install(FILES ${SONDE_BUNDLED_MODEL} DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde)
+  install(FILES ${SONDE_BUNDLED_MODEL} ${SONDE_BUNDLED_LEG} DESTINATION ${CMAKE_INSTALL_DATADIR}/sonde)
 endif()
 
 # All that `cmake --install` copies, for builds that leave tests, benchmarks and samples out.

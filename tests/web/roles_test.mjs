@@ -109,6 +109,7 @@ async function main() {
   const browser = await openBrowser(chromium);
   const errors = [];
   const learner = await visit(browser, running.learner, errors);
+  check(await learner.evaluate(() => window.sonde.hello.limb !== null && window.sonde.hello.limb !== undefined), "the page practises on a whole leg");
   await singleExams(learner);
   await learner.locator("#trainee").fill("Test learner");
   await learner.locator("#start-go").click();
