@@ -9,9 +9,10 @@ enum { GATE_SCATTERERS = 400, GATE_PULSES = 24 };
 
 // In the gate's frame: across the beam in the image plane, beside it, along it into the body.
 typedef struct gate_scatterer {
-  double at_m[3], way[3]; // way: unit, of a positive speed
-  double echo[2];
-  scene_blood blood;
+  double at_m[3], way[3];        // way: unit, of a positive speed
+  double home_m[3], home_way[3]; // where it was drawn: homes fill the box evenly
+  double echo[2], heard;         // heard: of the echo by now, 0 to 1
+  scene_blood blood, home;       // where it is, and at its home
 } gate_scatterer;
 
 struct sonde_gate {

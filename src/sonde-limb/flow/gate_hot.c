@@ -8,6 +8,8 @@
 #include "flow/colour.h"
 #include "flow/spectrum.h"
 
+#include <string.h>
+
 enum { BINS = SONDE_DOPPLER_BINS };
 static const double beam_m = 0.45e-3; // standard deviation across; twice that beside the plane
 static const double reach = 2.5;      // of them that scatterers fill
@@ -68,11 +70,31 @@ static void draw_scatterers(sonde_gate *g, double time_s) {
   for (uint32_t i = 0; i < GATE_SCATTERERS; ++i) {
     gate_scatterer *s = &g->scatterer[i];
     for (int k = 0; k < 3; ++k)
-      s->at_m[k] = g->half_m[k] * (2 * sonde_random_uniform(g->seed, g->numbers++) - 1);
-    new_echo(g, s);
+      s->at_m[k] = s->home_m[k] =
+          g->half_m[k] * (2 * sonde_random_uniform(g->seed, g->numbers++) - 1);
+    new_echo(g, s), s->heard = 1;
     power += 2 * power_at(g, s->at_m);
   }
   g->blood = 1 / sqrt(fmax(power, 1)), g->tissue_phase = 0, g->drawn = true;
+}
+
+// Blood fills its lumina evenly, as homes do: straight ways leave a vein that bends or narrows, and
+// what was lost so, or is too many, goes to a home that wants one of its blood.
+static void settle_scatterers(sonde_gate *g, scene_blood *blood, const scene_blood *home) {
+  int want[SCENE_ARTERY + 2] = {0}; // by what drives the blood, tissue first
+  for (uint32_t i = 0; i < GATE_SCATTERERS; ++i)
+    ++want[home[i].drive + 1], --want[blood[i].drive + 1];
+  uint32_t j = (uint32_t)(GATE_SCATTERERS * sonde_random_uniform(g->seed, g->numbers++));
+  for (uint32_t i = 0; i < GATE_SCATTERERS; ++i) {
+    int *many = &want[blood[i].drive + 1];
+    if (*many >= 0) continue;
+    while (want[home[j].drive + 1] <= 0) j = (j + 1) % GATE_SCATTERERS;
+    gate_scatterer *s = &g->scatterer[i];
+    ++*many, --want[home[j].drive + 1], blood[i] = home[j];
+    memcpy(s->at_m, g->scatterer[j].home_m, sizeof s->at_m);
+    new_echo(g, s), s->heard = 0;
+    j = (j + 1) % GATE_SCATTERERS;
+  }
 }
 
 void sonde_gate_put(sonde_gate *g, const sonde_flow_scene *scene,
@@ -95,23 +117,27 @@ void sonde_gate_put(sonde_gate *g, const sonde_flow_scene *scene,
     g->number = (uint64_t)floor(fmax(time_s, 0) / SONDE_GATE_COLUMN_S + 1e-6);
   }
   if (!g->drawn || settings->length_m != before.length_m) draw_scatterers(g, time_s);
-  // Which blood each of them is in.
-  sonde_vec3 drawn[GATE_SCATTERERS], axis[3];
-  scene_blood blood[GATE_SCATTERERS];
+  // Which blood each of them is in, and each of their homes.
+  sonde_vec3 drawn[2 * GATE_SCATTERERS], axis[3];
+  scene_blood blood[2 * GATE_SCATTERERS], *home = blood + GATE_SCATTERERS;
   const sonde_pose probe = sonde_truth_pose(place->echo);
   axes_of(g, axis);
-  for (uint32_t i = 0; i < GATE_SCATTERERS; ++i)
+  for (uint32_t i = 0; i < GATE_SCATTERERS; ++i) {
     drawn[i] = world_of(g, probe, g->scatterer[i].at_m);
-  scene_find_blood(scene, place->echo, drawn, GATE_SCATTERERS, blood);
+    drawn[GATE_SCATTERERS + i] = world_of(g, probe, g->scatterer[i].home_m);
+  }
+  scene_find_blood(scene, place->echo, drawn, 2 * GATE_SCATTERERS, blood);
+  settle_scatterers(g, blood, home);
   double solid = 0, all = 0;
   for (uint32_t i = 0; i < GATE_SCATTERERS; ++i) {
     gate_scatterer *s = &g->scatterer[i];
-    s->blood = blood[i];
-    const double part = power_at(g, s->at_m);
-    all += part, solid += blood[i].drive < 0 ? part : 0;
-    if (blood[i].drive < 0) continue;
-    const sonde_vec3 way = q_rotate(q_conj(probe.rotation), blood[i].along);
-    for (int k = 0; k < 3; ++k) s->way[k] = v_dot(way, axis[k]);
+    s->blood = blood[i], s->home = home[i];
+    const double part = power_at(g, s->home_m);
+    all += part, solid += home[i].drive < 0 ? part : 0;
+    const sonde_vec3 ways[2] = {q_rotate(q_conj(probe.rotation), blood[i].along),
+                                q_rotate(q_conj(probe.rotation), home[i].along)};
+    for (int k = 0; k < 3; ++k)
+      s->way[k] = v_dot(ways[0], axis[k]), s->home_way[k] = v_dot(ways[1], axis[k]);
   }
   // Beside the beam there is always some tissue.
   g->tissue = pow(10, tissue_db / 20) * sqrt(solid / fmax(all, 1e-9) + pow(10, -aside_db / 10));
@@ -128,7 +154,7 @@ static void add_echoes(const sonde_gate *g, const gate_scatterer *s, double spee
   double at[3], step = 0, curve = 0, turn[2], by[2];
   for (int k = 0; k < 3; ++k) at[k] = s->at_m[k] + speed * wait_s * s->way[k];
   const double deeper_m = step_m * s->way[2], ends = at[2] + (pulses - 1) * deeper_m;
-  double along = gate_weight(g, at[2]), gauss = g->blood * beam_weight(at);
+  double along = gate_weight(g, at[2]), gauss = g->blood * s->heard * beam_weight(at);
   const double along_step = pulses > 1 ? (gate_weight(g, ends) - along) / (pulses - 1) : 0;
   if (along == 0 && along_step == 0) return;
   for (int k = 0; k < 2; ++k) {
@@ -147,6 +173,40 @@ static void add_echoes(const sonde_gate *g, const gate_scatterer *s, double spee
     turn[1] = turn[0] * by[1] + turn[1] * by[0], turn[0] = re;
     gauss *= ratio, ratio *= bend, along += along_step;
   }
+}
+
+// What has left the box comes back where a line enters it, as other blood: the line of a home in
+// the same blood, faster ones as much more often as more enters there, or its own.
+static void enter(sonde_gate *g, const sonde_flow_scene *scene, gate_scatterer *s, double speed,
+                  double step_s) {
+  enum { TRIES = 8 };
+  bool other = false;
+  for (int n = 0; n < TRIES && !other; ++n) {
+    const gate_scatterer *h =
+        &g->scatterer[(uint32_t)(GATE_SCATTERERS * sonde_random_uniform(g->seed, g->numbers++))];
+    if (h->home.drive != s->blood.drive) continue;
+    if (!(sonde_random_uniform(g->seed, g->numbers++) * fabs(speed) <
+          fabs(scene_speed(scene, &h->home))))
+      break;
+    memcpy(s->at_m, h->home_m, sizeof s->at_m), memcpy(s->way, h->home_way, sizeof s->way);
+    s->blood = h->home, other = true;
+  }
+  double in = -INFINITY, out = INFINITY; // along its way, from where it is
+  for (int k = 0; k < 3; ++k) {
+    if (fabs(s->way[k]) < 1e-9) continue;
+    const double low = (-g->half_m[k] - s->at_m[k]) / s->way[k],
+                 high = (g->half_m[k] - s->at_m[k]) / s->way[k];
+    in = fmax(in, fmin(low, high)), out = fmin(out, fmax(low, high));
+  }
+  const double chord = fmax(out - in, 1e-5);
+  double by = out < 0 ? -ceil(-out / chord) * chord : ceil(fmax(in, 0) / chord) * chord;
+  if (other) { // some time in the last step
+    const double now = scene_speed(scene, &s->blood);
+    by = (now > 0 ? in : out) + now * step_s * sonde_random_uniform(g->seed, g->numbers++);
+  }
+  for (int k = 0; k < 3; ++k)
+    s->at_m[k] = clamp(s->at_m[k] + by * s->way[k], -g->half_m[k], g->half_m[k]);
+  new_echo(g, s);
 }
 
 // The spectrum of the last pulses as a column.
@@ -190,23 +250,12 @@ void gate_step(sonde_gate *g, const sonde_flow_scene *scene, double step_s) {
     if (s->blood.drive < 0) continue;
     const double speed = scene_speed(scene, &s->blood);
     if (pulses > 0) add_echoes(g, s, speed, wait_s, pulses, sum);
+    const double gently_s = 0.02; // a new echo comes in
+    s->heard = fmin(s->heard + step_s / gently_s, 1);
     for (int k = 0; k < 3; ++k) s->at_m[k] += speed * step_s * s->way[k];
-    // What has left the box comes back where its line enters it, as other blood.
     bool inside = true;
     for (int k = 0; k < 3; ++k) inside = inside && fabs(s->at_m[k]) <= g->half_m[k];
-    if (inside) continue;
-    double in = -INFINITY, out = INFINITY; // along its way, from where it is
-    for (int k = 0; k < 3; ++k) {
-      if (fabs(s->way[k]) < 1e-9) continue;
-      const double low = (-g->half_m[k] - s->at_m[k]) / s->way[k],
-                   high = (g->half_m[k] - s->at_m[k]) / s->way[k];
-      in = fmax(in, fmin(low, high)), out = fmin(out, fmax(low, high));
-    }
-    const double chord = fmax(out - in, 1e-5);
-    const double by = out < 0 ? -ceil(-out / chord) * chord : ceil(fmax(in, 0) / chord) * chord;
-    for (int k = 0; k < 3; ++k)
-      s->at_m[k] = clamp(s->at_m[k] + by * s->way[k], -g->half_m[k], g->half_m[k]);
-    new_echo(g, s);
+    if (!inside) enter(g, scene, s, speed, step_s);
   }
   const double left = pow(10, -g->loss_db / 20), noise = pow(10, noise_db / 20) / sqrt(2);
   const double turns =

@@ -155,7 +155,7 @@ void scene_find_blood(const sonde_flow_scene *s, const sonde_echo *echo, const s
   // A ball that holds the places, and what may reach into it.
   double far_m = 0;
   for (uint32_t n = 0; n < count; ++n) {
-    blood[n].drive = -1;
+    blood[n] = (scene_blood){.drive = -1};
     far_m = fmax(far_m, v_distance(drawn[n], drawn[0]));
   }
   const double depth_m = pose_apply_inverse(sonde_truth_pose(echo), drawn[0]).z + far_m;
