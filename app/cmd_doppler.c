@@ -33,7 +33,7 @@ static void prepare(void *to) {
                              .angle_rad = def.angle_rad,
                              .gate_m = def.gate_m,
                              .pulse_hz = NAN,
-                             .frequency_hz = def.frequency_hz,
+                             .frequency_hz = NAN,
                              .seconds = 12,
                              .seed = 1};
 }
@@ -67,7 +67,8 @@ static const app_option TABLE[] = {
     OPT_REAL(angle_rad, "angle-deg", "A", 0, 180, 0.017453292519943295,
              "between beam and flow; 90 and about it measure nothing; default 60"),
     OPT_REAL(gate_m, "gate-mm", "G", 0.5, 20, 1e-3, "length of the gate; default 3"),
-    OPT_REAL(frequency_hz, "frequency-mhz", "F", 1, 15, 1e6, "of the beam; default 5"),
+    OPT_REAL(frequency_hz, "frequency-mhz", "F", 1, 15, 1e6,
+             "of the beam; default 5, less for blood that would fold at 20 kHz"),
     OPT_REAL(
         pulse_hz, "prf-hz", "F", 500, 20000, 1,
         "pulse repetition frequency; default: one that the fastest blood of the recording needs"),
@@ -84,19 +85,23 @@ static int check(void *from) {
   return APP_OK;
 }
 
-// What the examiner reads off the spectrum, m/s and s; NaN where the recording has none of it.
+// What the examiner reads off the spectrum, or off the blood itself, m/s and s; NaN where the
+// recording has none of it.
 typedef struct readings {
-  double mean, least, most, peak; // of the mean velocity at rest; of the envelope, all the time
-  double augmentation;            // greatest mean after the squeeze over the mean at rest
-  double reflux;                  // time of blood that falls back after squeeze or strain
-  double truth_mean, truth_reflux, truth_phasicity; // the same of the network
+  double mean, least, most; // at rest; of the course that breath and beat give it
+  double peak;              // of the envelope, all the time
+  double augmentation;      // greatest mean after the squeeze over the mean at rest
+  double reflux;            // time of blood that falls back after squeeze or strain
 } readings;
 
 typedef struct record {
   uint32_t count;
   double hop_s;
   double *mean, *peak;   // [count] read off the spectrum
+  double *power;         // [count] of the spectrum
   double *truth, *lumen; // [count] true mean velocity in the gate and over the lumen
+  double fastest;        // velocity of the blood
+  double heart_hz, breath_hz;
   uint8_t *grey;         // [count * SONDE_DOPPLER_BINS] by column
   double pressure_pa;    // in the vein at the start
   double limit, slowest; // velocities that are not folded, that pass the wall filter
@@ -106,7 +111,7 @@ static const double HOP_S = 0.01, DARKEST_DB = 36, SPARE = 1.25;
 enum { HOP_STEPS = 10 }; // HOP_S over STEP_S
 
 static void clear(record *r) {
-  free(r->mean), free(r->peak), free(r->truth), free(r->lumen), free(r->grey);
+  free(r->mean), free(r->peak), free(r->power), free(r->truth), free(r->lumen), free(r->grey);
 }
 
 // Puts the median of five columns in the place of each, as scanners smooth their readings.
@@ -132,7 +137,7 @@ typedef struct blood {
   sonde_flow_def flow;
 } blood;
 
-static const double STEP_S = 1e-3, LONGEST_WINDOW_S = SONDE_DOPPLER_BINS / 500.0;
+static const double STEP_S = 1e-3, LONGEST_WINDOW_S = SONDE_DOPPLER_PULSES / 500.0;
 
 // Mean velocity and profile a step after `n - 1`, or at the start.
 static void follow(const blood *b, uint32_t n, double profile[SONDE_FLOW_RINGS]) {
@@ -176,7 +181,7 @@ static sonde_status run_blood(const options *a, const sonde_model *model, blood 
                             : sonde_flow_velocity(&net, segment);
     follow(b, n, profile);
     for (int k = 0; k < SONDE_FLOW_RINGS; ++k)
-      b->fastest_m_s = fmax(b->fastest_m_s, fabs(profile[k]));
+      if (fabs(profile[k]) > fabs(b->fastest_m_s)) b->fastest_m_s = profile[k];
   }
   return SONDE_OK;
 }
@@ -190,24 +195,33 @@ static sonde_status take(const options *a, const sonde_model *model, record *r,
   sonde_doppler_def def = sonde_doppler_def_default();
   def.half_short_m = def.half_long_m = b.radius_m;
   def.angle_rad = a->angle_rad, def.gate_m = fmin(a->gate_m, 2 * b.radius_m);
-  def.frequency_hz = a->frequency_hz, def.seed = (uint64_t)a->seed;
+  def.frequency_hz = isnan(a->frequency_hz) ? def.frequency_hz : a->frequency_hz;
+  def.seed = (uint64_t)a->seed;
   // The beam's width spreads the spectrum by a fifth beyond the fastest blood.
-  def.pulse_hz = 1000;
-  double needed = 1000 * SPARE * b.fastest_m_s / sonde_doppler_limit(&def);
-  def.pulse_hz =
-      isnan(a->pulse_hz) ? fmin(fmax(500 * ceil(needed / 500), 1500), 20000) : a->pulse_hz;
+  const double most_hz = 20000, each_hz = 500;
+  def.pulse_hz = each_hz;
+  double needed = each_hz * SPARE * fabs(b.fastest_m_s) / sonde_doppler_limit(&def);
+  if (isnan(a->frequency_hz) && isnan(a->pulse_hz) && needed > most_hz)
+    def.frequency_hz *= most_hz / needed, needed = most_hz;
+  def.pulse_hz = isnan(a->pulse_hz) ? fmin(fmax(each_hz * ceil(needed / each_hz), each_hz), most_hz)
+                                    : a->pulse_hz;
+  // Slow scales have a lower wall filter.
+  def.filter_hz = fmin(def.filter_hz, def.pulse_hz / 50);
   sonde_doppler *doppler = NULL;
   if (!status) status = sonde_doppler_create(&def, &doppler, error);
   r->count = (uint32_t)(a->seconds / HOP_S), r->limit = sonde_doppler_limit(&def);
-  // Slower blood leaks through the filter's edge, up to one and a half bins beyond it.
-  r->slowest = 2 * r->limit * (def.filter_hz / def.pulse_hz + 1.5 / SONDE_DOPPLER_BINS);
+  // The spectrum of slower blood reaches into the filter: a window blurs it by so much.
+  const double window_s = fmax(SONDE_DOPPLER_WINDOW_S, SONDE_DOPPLER_PULSES / def.pulse_hz);
+  r->slowest = 2 * r->limit * (def.filter_hz + 2 / window_s) / def.pulse_hz;
+  r->fastest = b.fastest_m_s;
+  r->heart_hz = b.flow.heart_rate_hz, r->breath_hz = b.flow.breath_rate_hz;
+  r->power = calloc(r->count, sizeof *r->power);
   r->mean = calloc(r->count, sizeof *r->mean), r->peak = calloc(r->count, sizeof *r->peak);
   r->truth = calloc(r->count, sizeof *r->truth), r->lumen = calloc(r->count, sizeof *r->lumen);
   r->grey = calloc(r->count, SONDE_DOPPLER_BINS);
   double *power = calloc(r->count, SONDE_DOPPLER_BINS * sizeof *power), most = 0;
-  if (!status && !(r->mean && r->peak && r->truth && r->lumen && r->grey && power))
+  if (!status && !(r->mean && r->peak && r->power && r->truth && r->lumen && r->grey && power))
     status = app_error(error, SONDE_MEMORY, "out of memory");
-  const double window_s = SONDE_DOPPLER_BINS / def.pulse_hz;
   double time = -0.5 * window_s, profile[SONDE_FLOW_RINGS];
   uint64_t pulses = 0;
   uint32_t step = 0;
@@ -227,7 +241,8 @@ static sonde_status take(const options *a, const sonde_model *model, record *r,
     sonde_doppler_read(doppler, &s);
     r->mean[column] = s.mean_m_s, r->peak[column] = s.peak_m_s;
     memcpy(power + (size_t)column * SONDE_DOPPLER_BINS, s.power, sizeof s.power);
-    for (int k = 0; k < SONDE_DOPPLER_BINS; ++k) most = fmax(most, s.power[k]);
+    for (int k = 0; k < SONDE_DOPPLER_BINS; ++k)
+      most = fmax(most, s.power[k]), r->power[column] += s.power[k];
   }
   for (size_t i = 0; i < (size_t)r->count * SONDE_DOPPLER_BINS && !status; ++i) {
     double db = power[i] > 0 ? 10 * log10(power[i] / most) + 6 : -INFINITY;
@@ -239,42 +254,69 @@ static sonde_status take(const options *a, const sonde_model *model, record *r,
   return status;
 }
 
-// Rest is what lies before the first manoeuvre, without the first second.
-static readings read_off(const options *a, const record *r) {
-  readings out = {NAN, NAN, NAN, 0, NAN, NAN, NAN, NAN, NAN};
-  double low = INFINITY, high = -INFINITY;
-  out.peak = 0;
-  double squeeze = isnan(a->squeeze_s) ? INFINITY : a->squeeze_s;
-  double strain = isnan(a->valsalva_s) ? INFINITY : a->valsalva_s;
-  double from = 1, to = fmin(fmin(squeeze, strain), a->seconds), sum = 0, truth = 0, lumen = 0;
-  uint32_t count = 0;
+// The mean at rest, which is what lies before the first manoeuvre without the first second, and the
+// least and the most of the course that the breath, its overtone and the heart's beat give it:
+// least squares, each column by the power that it heard.
+static void fit_rest(const options *a, const record *r, const double *velocity, readings *out) {
+  enum { TERMS = 7 };
+  const double squeeze = isnan(a->squeeze_s) ? INFINITY : a->squeeze_s;
+  const double strain = isnan(a->valsalva_s) ? INFINITY : a->valsalva_s;
+  const uint32_t from = (uint32_t)(1 / HOP_S),
+                 to = (uint32_t)(fmin(fmin(squeeze, strain), a->seconds) / HOP_S);
+  if (to < from + TERMS) return;
+  const double rate_hz[] = {r->breath_hz, 2 * r->breath_hz, r->heart_hz};
+  double silent = INFINITY, m[TERMS][TERMS + 1] = {{0}}, low = INFINITY, high = -INFINITY;
+  for (uint32_t k = from; k < to; ++k) silent = fmin(silent, r->power[k]);
+  // Twice through the columns: the sums of the equations, then, solved, their course.
+  for (int solved = 0; solved < 2; ++solved) {
+    for (uint32_t k = from; k < to; ++k) {
+      double term[TERMS + 1] = {1}, now = 0;
+      for (int h = 0; h < 3; ++h)
+        term[1 + 2 * h] = cos(2 * acos(-1) * rate_hz[h] * k * HOP_S),
+                     term[2 + 2 * h] = sin(2 * acos(-1) * rate_hz[h] * k * HOP_S);
+      term[TERMS] = velocity[k];
+      const double weight = velocity == r->mean ? r->power[k] - silent : 1;
+      for (int i = 0; i < TERMS; ++i) {
+        now += solved ? m[i][TERMS] * term[i] : 0;
+        for (int j = 0; j <= TERMS && !solved; ++j) m[i][j] += weight * term[i] * term[j];
+      }
+      low = solved ? fmin(low, now) : low, high = solved ? fmax(high, now) : high;
+    }
+    // A rest that is shorter than a breath says little of it.
+    for (int i = 1; i < TERMS && !solved; ++i) m[i][i] += 1e-3 * m[0][0];
+    for (int i = 0; i < TERMS && !solved; ++i) {
+      const double pivot = m[i][i];
+      if (!(pivot > 0)) return;
+      for (int j = 0; j <= TERMS; ++j) m[i][j] /= pivot;
+      for (int l = 0; l < TERMS; ++l) {
+        const double by = m[l][i];
+        for (int j = 0; j <= TERMS && l != i; ++j) m[l][j] -= by * m[i][j];
+      }
+    }
+  }
+  out->mean = m[0][TERMS], out->least = low, out->most = high;
+}
+
+// What is read off a course of mean velocities.
+static readings read_off(const options *a, const record *r, const double *velocity) {
+  readings out = {NAN, NAN, NAN, 0, NAN, NAN};
+  const double squeeze = isnan(a->squeeze_s) ? INFINITY : a->squeeze_s;
+  const double strain = isnan(a->valsalva_s) ? INFINITY : a->valsalva_s;
+  const double first = fmin(squeeze, strain);
+  fit_rest(a, r, velocity, &out);
+  double greatest = -INFINITY, back = 0;
   for (uint32_t k = 0; k < r->count; ++k) {
-    double t = k * HOP_S;
+    const double t = k * HOP_S;
     if (fabs(r->peak[k]) > fabs(out.peak)) out.peak = r->peak[k];
-    if (t < from || t >= to) continue;
-    sum += r->mean[k], truth += r->truth[k], lumen += r->lumen[k], ++count;
-    // Extremes of means over a fifth of a second, which average the scatterers' chance.
-    enum { BESIDE = 10 };
-    double now = 0, true_now = 0;
-    if (k < BESIDE || k + BESIDE >= r->count || t + BESIDE * HOP_S >= to) continue;
-    for (uint32_t n = k - BESIDE; n <= k + BESIDE; ++n)
-      now += r->mean[n] / (2 * BESIDE + 1), true_now += r->truth[n] / (2 * BESIDE + 1);
-    out.least = fmin(out.least, now), out.most = fmax(out.most, now);
-    low = fmin(low, true_now), high = fmax(high, true_now);
+    if (t > squeeze && t < squeeze + 3) greatest = fmax(greatest, velocity[k]);
+    if (t < first || k == 0) continue;
+    // The part of the step between two columns in which it falls back.
+    const double one = -r->slowest - velocity[k - 1], other = -r->slowest - velocity[k];
+    if (one > 0 || other > 0)
+      back += HOP_S * (fmax(one, 0) + fmax(other, 0)) / (fabs(one) + fabs(other));
   }
-  if (count)
-    out.mean = sum / count, out.truth_mean = lumen / count,
-    out.truth_phasicity = (high - low) * count / truth;
-  double greatest = -INFINITY, back = 0, truth_back = 0;
-  for (uint32_t k = 0; k < r->count; ++k) {
-    double t = k * HOP_S;
-    if (t > squeeze && t < squeeze + 3) greatest = fmax(greatest, r->mean[k]);
-    if (t < fmin(squeeze, strain)) continue;
-    if (r->mean[k] < -r->slowest) back += HOP_S;
-    if (r->truth[k] < -r->slowest) truth_back += HOP_S;
-  }
-  if (squeeze < a->seconds && count) out.augmentation = greatest / out.mean;
-  if (fmin(squeeze, strain) < a->seconds) out.reflux = back, out.truth_reflux = truth_back;
+  if (squeeze < a->seconds) out.augmentation = greatest / out.mean;
+  if (first < a->seconds) out.reflux = back;
   return out;
 }
 
@@ -350,7 +392,9 @@ static int run(void *from) {
     sonde_model_destroy(model);
     return app_fail(VERB, &error);
   }
-  readings x = read_off(a, &r);
+  const readings x = read_off(a, &r, r.mean), truth = read_off(a, &r, r.truth);
+  readings lumen = truth;
+  fit_rest(a, &r, r.lumen, &lumen);
   const bool is_limb = limb != NULL;
   const sonde_limb_position position = sonde_limb_position_of(model);
   const bool posed = position != SONDE_LIMB_POSITIONS;
@@ -365,7 +409,10 @@ static int run(void *from) {
       app_json("venous_mmhg:%g", r.pressure_pa / SONDE_PA_PER_MMHG);
     if (posed) app_json_text("position", sonde_limb_position_name(position));
     app_json("augmentation:%g reflux_s:%g true_mean_cm_s:%g true_phasicity:%g true_reflux_s:%g",
-             x.augmentation, x.reflux, 100 * x.truth_mean, x.truth_phasicity, x.truth_reflux);
+             x.augmentation, x.reflux, 100 * lumen.mean, (truth.most - truth.least) / truth.mean,
+             truth.reflux);
+    app_json("true_gate_cm_s:%g true_peak_cm_s:%g true_augmentation:%g", 100 * truth.mean,
+             100 * r.fastest, truth.augmentation);
     app_json_end();
   } else {
     printf("%s: at rest %.1f cm/s in the gate (%.1f to %.1f with breath and beat, phasicity %.2f), "
@@ -375,7 +422,7 @@ static int run(void *from) {
       printf("%s: %.0f mmHg in the vein\n", sonde_limb_position_name(position),
              r.pressure_pa / SONDE_PA_PER_MMHG);
     printf("mean over the lumen in truth %.1f cm/s; velocities beyond %.0f cm/s are folded\n",
-           100 * x.truth_mean, 100 * r.limit);
+           100 * lumen.mean, 100 * r.limit);
     if (!isnan(x.augmentation))
       printf("squeeze of the calf: %.1f times the flow at rest\n", x.augmentation);
     if (!isnan(x.reflux)) printf("reflux: %.2f s\n", x.reflux);

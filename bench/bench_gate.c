@@ -59,7 +59,7 @@ static void listen(sonde_model *model, uint32_t site, sonde_interior *in, sonde_
   if (!status) status = sonde_flow_start(&def, &flow, NULL);
   SONDE_ASSERT(!status);
   sonde_gate_settings s = sonde_gate_settings_default();
-  s.x_m = at.x, s.z_m = at.z, s.scale_m_s = scale_m_s, s.filter_hz = 20;
+  s.x_m = at.x, s.z_m = at.z, s.scale_m_s = scale_m_s, s.filter_hz = 10;
   // The lean that sees more of the flow.
   const double steers[2] = {0.35, -0.35};
   sonde_gate_place where = {echo, 5e6, 0, 0};
@@ -99,7 +99,7 @@ static void listen(sonde_model *model, uint32_t site, sonde_interior *in, sonde_
     const double x = clamp((time_s - 1) / SONDE_GATE_COLUMN_S, 0, COLUMNS + 18);
     c->truth[n] = truth[(int)x] + (x - floor(x)) * (truth[(int)x + 1] - truth[(int)x]);
   }
-  *slowest = 2 * axes.limit_m_s * (s.filter_hz / axes.pulse_hz + 1.5 / SONDE_DOPPLER_BINS);
+  *slowest = 2 * axes.limit_m_s * (s.filter_hz + 2 / axes.window_s) / axes.pulse_hz;
   sonde_gate_destroy(gate);
   sonde_flow_scene_destroy(scene);
   sonde_free(still);

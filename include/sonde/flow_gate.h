@@ -18,6 +18,8 @@ extern "C" {
 /** Columns come so many seconds after each other; so many are kept. */
 #define SONDE_GATE_COLUMN_S 0.01
 enum { SONDE_GATE_COLUMNS = 64 };
+/** Scale from which on the wall filter is what is set. */
+#define SONDE_GATE_FILTERED_M_S 0.2
 
 /** What an examiner sets; sonde_gate_clean() says the ranges. */
 typedef struct sonde_gate_settings {
@@ -30,7 +32,8 @@ typedef struct sonde_gate_settings {
   double scale_m_s; /**< velocity along the beam from which it folds when the base line is in the
                          middle; less where pulses have a longer way to the gate and back */
   double baseline;  /**< how far the base line is moved down, share of half the axis */
-  double filter_hz; /**< the wall filter: Doppler shifts below are removed */
+  double filter_hz; /**< the wall filter: Doppler shifts below are removed; of a scale below
+                         SONDE_GATE_FILTERED_M_S in proportion less */
   double gain_db;   /**< of the shown power */
 } sonde_gate_settings;
 /** 3 mm at a depth of 20 mm, 20 cm/s, 50 Hz, 60 degrees, beam and base line straight. @thread any
@@ -45,9 +48,10 @@ SONDE_API sonde_gate_settings sonde_gate_clean(const sonde_gate_settings *wanted
 
 /** The spectrum at one time. */
 typedef struct sonde_gate_column {
-  uint64_t number;          /**< times SONDE_GATE_COLUMN_S: when its last pulse was sent */
-  float mean_m_s, peak_m_s; /**< power-weighted; the edge away from zero, with 99 % of the power
-                                 below it; 0: nothing but noise */
+  uint64_t number; /**< times SONDE_GATE_COLUMN_S: when its last pulse was sent */
+  float mean_m_s,
+      peak_m_s; /**< power-weighted, what the filter took even between its edges; the edge away from
+                   zero, with 99 % of the power below it; 0: nothing but noise */
   uint8_t
       power[SONDE_DOPPLER_BINS]; /**< from the lowest velocity that is shown; 0 to 255 are 36 dB */
 } sonde_gate_column;
