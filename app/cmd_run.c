@@ -477,8 +477,8 @@ const app_command cmd_run = {
     .text = "Simulates compression ultrasound of a leg at 1 kHz and serves the page that shows it "
             "on 127.0.0.1. Ctrl-C stops.",
     .tail =
-        "In the page it is the bundled leg, from groin to ankle, unless --site names a place of "
-        "the thigh.",
+        "In the page it is the bundled leg, from groin to ankle, unless --device-at or --from name "
+        "places of the thigh.",
     OPT_TABLE(TABLE),
     .size = sizeof(options),
     .defaults = &DEFAULTS,

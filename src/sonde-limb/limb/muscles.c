@@ -275,8 +275,9 @@ static double filler_share(uint32_t kind, double level) {
   return share < 0.003 ? 0 : share;
 }
 
-// Makes one row. Weights begin at those of the row `from` beside it, which is made already, below
-// all others where that did not know the cell. @param from `row` itself: all begin at 0
+// Makes one row of the diagram. Weights begin at those of the row `from` beside it, which is made
+// already; a cell that this row does not know has a weight below all others. @param from `row`
+// itself: all weights begin at 0
 static void make_row(const sonde_limb *limb, uint32_t row, uint32_t from, section *s) {
   struct limb_muscles *m = limb->muscles;
   double level = LIMB_TOP + row * LIMB_CELL_STEP, mean = 0;
@@ -338,9 +339,11 @@ static sonde_status make_rows(void *user, uint32_t worker, uint32_t way, const a
   section *s = SONDE_NEW(section, 1);
   (void)worker, (void)stop;
   if (!s) return sonde_fail_memory(error);
-  for (uint32_t row = MIDDLE_ROW; row + 1 < LIMB_CELL_ROWS && way == 0; ++row)
-    make_row(limb, row + 1, row, s);
-  for (uint32_t row = MIDDLE_ROW; row > 0 && way == 1; --row) make_row(limb, row - 1, row, s);
+  if (way == 0)
+    for (uint32_t row = MIDDLE_ROW; row + 1 < LIMB_CELL_ROWS; ++row)
+      make_row(limb, row + 1, row, s);
+  else
+    for (uint32_t row = MIDDLE_ROW; row > 0; --row) make_row(limb, row - 1, row, s);
   sonde_free(s);
   return SONDE_OK;
 }
