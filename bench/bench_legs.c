@@ -1,7 +1,8 @@
 // bench_legs OUT.csv [COUNT [SEED]]: what whole legs cost, a row for each of COUNT (10) drawn
 // limbs: making and saving it, loading its file, its inside, a static press to 8 N at mid-thigh,
 // the steps of a session's world at 1 kHz and pictures at 25 Hz while a probe presses and slides at
-// four stations. Processor times of this thread; memory as the system counts it.
+// four stations. Making and loading by the wall clock, since they take two threads, all else
+// processor times of this thread; memory as the system counts it.
 #include "sonde/limb_model.h"
 #include "sonde/sonde.h"
 
@@ -75,16 +76,16 @@ static sonde_status make(uint64_t seed, const char *path, leg *l, cost *c, sonde
   sonde_limb_body body = sonde_limb_unknown();
   const sonde_limb_model_def def = sonde_limb_model_def_default();
   sonde_model *made = NULL;
-  double start = bench_seconds();
+  double start = bench_wall_seconds();
   sonde_status status = sonde_limb_draw(&body, seed, &body, error);
   if (!status) status = sonde_limb_model(&body, &def, &made, error);
   if (!status) status = sonde_model_save(made, path, error);
-  c->build_s = bench_seconds() - start;
+  c->build_s = bench_wall_seconds() - start;
   sonde_model_destroy(made);
   const double before_mb = resident_mb();
-  start = bench_seconds();
+  start = bench_wall_seconds();
   if (!status) status = sonde_limb_model_load(path, &l->model, error);
-  c->load_s = bench_seconds() - start;
+  c->load_s = bench_wall_seconds() - start;
   const sonde_world_def world = sonde_session_def_default().world;
   const sonde_echo_def echo = sonde_echo_def_default();
   start = bench_seconds();
