@@ -17,7 +17,7 @@ set(SONDE_BUNDLED_LEG ${PROJECT_BINARY_DIR}/share/sonde/leg.sonde)
 add_custom_command(
   OUTPUT ${SONDE_BUNDLED_LEG}
   COMMAND ${CMAKE_COMMAND} -E make_directory ${PROJECT_BINARY_DIR}/share/sonde
-  COMMAND sonde limb --seed 3 --bmi 24 --model ${SONDE_BUNDLED_LEG}
+  COMMAND sonde limb --seed 3 --bmi 24 --model ${SONDE_BUNDLED_LEG} > ${PROJECT_BINARY_DIR}/leg.txt
   DEPENDS sonde
   COMMENT "Drawing the bundled leg" VERBATIM)
 add_custom_target(thigh ALL DEPENDS ${SONDE_BUNDLED_MODEL} ${SONDE_BUNDLED_LEG})
