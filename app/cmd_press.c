@@ -60,8 +60,8 @@ static const app_option TABLE[] = {
              "stiffness only"),
     OPT_FLAG(
         solid, "solid",
-        "press the hyperelastic solid of a site instead of the springs, to equilibrium: force, "
-        "penetration, work and area; it has no vessels"),
+        "press the hyperelastic solid instead of the springs, to equilibrium; its displacement and "
+        "stress move the inside; also tells work and area of contact"),
     OPT_TEXT(
         moduli, "moduli", "FILE",
         "materials of the solid, as sonde fit --solid writes them; default those of the study"),
@@ -73,6 +73,7 @@ static const app_option TABLE[] = {
 
 typedef struct press {
   settled scene;
+  press_solid solid;
   sonde_pose start; // at rest on the site or station
   char at[64];      // what it is called
   sonde_pathology pathology;
@@ -103,64 +104,28 @@ static void print_vessel(const char *name, const sonde_vessel_state *v, bool cut
   }
 }
 
-// The solid, with the keys of the springs: null where it has no such thing.
-static int run_solid(const options *o) {
-  press_solid p = {.model = o->model,
-                   .probe = o->probe,
-                   .moduli = o->moduli,
-                   .friction = isnan(o->friction) ? 0 : o->friction,
-                   .site = o->site,
-                   .depth_m = o->depth_m,
-                   .force_n = o->force_n};
-  const sonde_vessel_state none = {0};
-  sonde_error error = {0};
-  app_progress_begin("pressing");
-  const sonde_status status = press_solid_find(&p, &error);
-  app_progress_end();
-  if (status) return app_fail("press", &error);
-  const sonde_equilibrium_result *r = &p.result;
-  const double work_mj = 1e3 * (r->tissue_j + r->contact_j + r->slipped_j);
-  if (!o->json) {
-    printf("site %ld, probe %s, solid\n", o->site, o->probe);
-    printf("force         %8.3f N\n", p.force_n);
-    printf("penetration   %8.2f mm\n", p.depth_m * 1e3);
-    printf("work          %8.3f mJ\n", work_mj);
-    printf("area          %8.1f mm2 of the skin at rest\n", 1e6 * r->area_m2);
-    printf("residual      %8.1e of the contact force (%u steps)\n", r->residual, r->steps);
-    return APP_OK;
-  }
-  app_json_begin();
-  app_json("force_n:%g penetration_mm:%g reaction_n:%g contact_n:%g work_mj:%g area_mm2:%g",
-           p.force_n, p.depth_m * 1e3, p.reaction_n, p.reaction_n, work_mj, 1e6 * r->area_m2);
-  print_vessel("vein", &none, false);
-  print_vessel("artery", &none, false);
-  app_json("vein_short_mm:%g residual:%g steps:%u", (double)NAN, r->residual, r->steps);
-  app_json("tissue:%s friction:%g probe:%s site:%ld", "solid", p.friction, o->probe, o->site);
-  app_json_end();
-  return APP_OK;
-}
-
 static int check(void *from) {
   const options *o = from;
-  static const char *const SPRINGS[] = {"station",     "cuff-mmhg",    "case",     "vein-depth-mm",
-                                        "venous-mmhg", "thrombus-kpa", "wall-kpa", "sheath",
-                                        "preset",      "image"};
+  static const char *const SPRINGS[] = {"cuff-mmhg", "preset"};
   if (!o->solid && o->moduli) return app_usage_error("press", "--moduli goes with --solid");
   if (!o->solid && app_option_given("friction"))
     return app_usage_error("press", "--friction goes with --solid");
   for (size_t k = 0; k < sizeof SPRINGS / sizeof *SPRINGS && o->solid; ++k)
     if (app_option_given(SPRINGS[k]))
-      return app_usage_error("press", "--solid goes without --%s: it has layers only", SPRINGS[k]);
-  if (o->solid && o->site < 0) return app_usage_error("press", "--solid needs --site");
+      return app_usage_error("press", "--solid goes without --%s", SPRINGS[k]);
   return APP_OK;
 }
 
 static void print(const press *p, const options *o) {
   const settled *s = &p->scene;
+  const sonde_equilibrium_result *r = &p->solid.result;
+  const double work_mj = 1e3 * (r->tissue_j + r->contact_j + r->slipped_j);
+  const double area_mm2 = 1e6 * r->area_m2;
   if (o->json) {
     app_json_begin();
     app_json("force_n:%g penetration_mm:%g reaction_n:%g contact_n:%g", s->force_n,
              s->depth_m * 1e3, s->result.reaction_n, s->result.contact_n);
+    if (o->solid) app_json("work_mj:%g area_mm2:%g", work_mj, area_mm2);
     print_vessel("vein", &p->vessel[0], p->cut[0]);
     print_vessel("artery", &p->vessel[1], p->cut[1]);
     if (!isnan(o->cuff_pa)) {
@@ -172,6 +137,7 @@ static void print(const press *p, const options *o) {
     if (s->interior) settled_branches(s, true);
     settled_json_jumps(s);
     app_json("case:%s probe:%s", p->pathology.name, s->probe.name);
+    if (o->solid) app_json("tissue:%s friction:%g", "solid", p->solid.friction);
     if (o->site >= 0)
       app_json("site:%ld", o->site);
     else
@@ -179,9 +145,12 @@ static void print(const press *p, const options *o) {
     app_json_end();
     return;
   }
-  printf("%s, probe %s, case %s\n", p->at, s->probe.name, p->pathology.name);
+  printf("%s, probe %s, case %s%s\n", p->at, s->probe.name, p->pathology.name,
+         o->solid ? ", solid" : "");
   printf("force         %8.3f N\n", s->force_n);
   printf("penetration   %8.2f mm\n", s->depth_m * 1e3);
+  if (o->solid) printf("work          %8.3f mJ\n", work_mj);
+  if (o->solid) printf("area          %8.1f mm2 of the skin at rest\n", area_mm2);
   printf("residual      %8.1e of the contact force (%u steps)\n", s->result.residual,
          s->iterations);
   if (!p->cut[0])
@@ -220,10 +189,15 @@ static double find_closing_cuff(const press *p) {
 
 static int run(void *from) {
   const options *o = from;
-  if (o->solid) return run_solid(o);
   const bool cuff = !isnan(o->cuff_pa);
   assert(cuff + !isnan(o->force_n) + !isnan(o->depth_m) == 1);
-  press p = {.vein_depth_m = o->vein_depth_m, .closes_pa = NAN};
+  press p = {.scene.without_springs = o->solid,
+             .solid = {.moduli = o->moduli,
+                       .friction = isnan(o->friction) ? 0 : o->friction,
+                       .depth_m = o->depth_m,
+                       .force_n = o->force_n},
+             .vein_depth_m = o->vein_depth_m,
+             .closes_pa = NAN};
   sonde_pathology *vein = &p.pathology;
   sonde_error error = {0};
   sonde_preset preset = sonde_preset_default();
@@ -247,7 +221,9 @@ static int run(void *from) {
   if (!status) status = settled_open(&p.scene, o->model, o->probe, &preset, vessels, &error);
   if (!status)
     status = settled_place(&p.scene, o->model, o->site, o->station, &p.start, p.at, &error);
-  if (!status) {
+  if (!status && o->solid) {
+    status = press_solid_find(&p.solid, &p.scene, p.start, &error);
+  } else if (!status) {
     double depth_m = cuff ? -CUFF_LIFT_M : o->depth_m;
     status = !isnan(o->force_n) ? settled_force(&p.scene, p.start, o->force_n, &error)
                                 : settled_press(&p.scene, p.start, depth_m, INFINITY, &error);
@@ -261,8 +237,8 @@ static int run(void *from) {
           sonde_interior_set_vein_depth(p.scene.interior, p.start.position, p.vein_depth_m, &error);
     if (!status) {
       if (cuff) p.closes_pa = find_closing_cuff(&p);
-      settled_update(&p.scene, &p.pathology, cuff ? o->cuff_pa : 0,
-                     sonde_state_tick(p.scene.state));
+      const uint64_t tick = o->solid ? 0 : sonde_state_tick(p.scene.state);
+      settled_update(&p.scene, &p.pathology, cuff ? o->cuff_pa : 0, tick);
       for (int which = 0; which < 2; ++which)
         p.cut[which] =
             sonde_interior_vessel_at_plane(p.scene.interior, which, p.scene.pose, &p.vessel[which]);
@@ -283,6 +259,7 @@ static int run(void *from) {
   app_progress_end();
   if (!status) print(&p, o);
   settled_close(&p.scene);
+  press_solid_clear(&p.solid);
   return status ? app_fail("press", &error) : APP_OK;
 }
 

@@ -56,7 +56,8 @@ static sonde_status time_press(const paper *p, times *t, sonde_error *error) {
                                        s.probe.half_x_m,
                                        s.probe.half_y_m,
                                        0,
-                                       SONDE_POSTURE_SUPINE};
+                                       SONDE_POSTURE_SUPINE,
+                                       NULL};
     double *best_s = &t->frame_s[k / every];
     *best_s = INFINITY; // of three: other work on the machine slows single ones
     for (int repeat = 0; repeat < 3; ++repeat) {

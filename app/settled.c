@@ -22,13 +22,15 @@ sonde_status settled_open(settled *s, const char *model, const char *probe,
   sonde_status status = sonde_probe_create(probe, &s->probe, error);
   if (!status) status = sonde_limb_model_load(model, &s->model, error);
   if (!status && preset) status = sonde_preset_apply(preset, s->model, &world, error);
-  if (!status) status = sonde_state_create(s->model, &world, &s->state, error);
+  if (!status && !s->without_springs)
+    status = sonde_state_create(s->model, &world, &s->state, error);
   if (status || (!needs_interior && !s->model->femur.vertex_count)) return status;
   return sonde_interior_create(s->model, &s->interior, error);
 }
 
 void settled_close(settled *s) {
   sonde_interior_destroy(s->interior);
+  sonde_solid_tissue_destroy(s->tissue);
   sonde_state_destroy(s->state);
   sonde_probe_clear(&s->probe);
   sonde_model_destroy(s->model);
@@ -166,11 +168,19 @@ void settled_json_jumps(const settled *s) {
 void settled_update(const settled *s, const sonde_pathology *pathology, double cuff_pa,
                     uint64_t tick) {
   if (!s->interior) return;
-  sonde_interior_update(s->interior,
-                        &(sonde_interior_input){sonde_state_positions(s->state),
-                                                sonde_state_contact_forces(s->state), s->pose,
-                                                pathology, -1, tick, s->probe.half_x_m,
-                                                s->probe.half_y_m, cuff_pa, SONDE_POSTURE_SUPINE});
+  const sonde_interior_input input = {
+      .positions_m = s->tissue ? NULL : sonde_state_positions(s->state),
+      .contact_forces_n = s->tissue ? NULL : sonde_state_contact_forces(s->state),
+      .world_from_probe = s->pose,
+      .pathology = pathology,
+      .dt_s = -1,
+      .tick = tick,
+      .face_half_x_m = s->probe.half_x_m,
+      .face_half_y_m = s->probe.half_y_m,
+      .cuff_pa = cuff_pa,
+      .posture = SONDE_POSTURE_SUPINE,
+      .tissue = s->tissue};
+  sonde_interior_update(s->interior, &input);
 }
 
 void settled_branches(const settled *s, bool json) {

@@ -6,20 +6,22 @@
 #include "sonde/sonde.h"
 
 typedef struct settled {
+  bool without_springs; // set before it is opened: something else presses, and gives the tissue
   sonde_model *model;
   sonde_state *state;
   sonde_probe probe;
   sonde_interior *interior;
-  sonde_pose pose; // world_from_probe
-  double depth_m;  // along the beam from where the press began
-  double force_n;  // along the beam, onto the skin
+  sonde_interior_tissue *tissue; // NULL: the springs' skin moves the inside
+  sonde_pose pose;               // world_from_probe
+  double depth_m;                // along the beam from where the press began
+  double force_n;                // along the beam, onto the skin
   sonde_settle_result result;
   sonde_path_result path; // of the last press
   uint32_t iterations;    // of all settling
 } settled;
 
-// preset: of damping and friction; NULL: none. needs_interior: a model without a bone is refused;
-// else its interior is NULL.
+// preset: of damping and friction; NULL: none; not of one without springs. needs_interior: a model
+// without a bone is refused; else its interior is NULL.
 sonde_status settled_open(settled *s, const char *model, const char *probe,
                           const sonde_preset *preset, bool needs_interior, sonde_error *error);
 void settled_close(settled *s);

@@ -62,7 +62,7 @@ static const float *look(stage *s, uint64_t tick) {
   uint32_t lines, samples;
   sonde_interior_update(s->interior, &(sonde_interior_input){s->leg.surface.vertices, s->forces,
                                                              s->pose, &s->pathology, -1, tick, 0.02,
-                                                             0.005, 0, SONDE_POSTURE_SUPINE});
+                                                             0.005, 0, SONDE_POSTURE_SUPINE, NULL});
   sonde_echo_render(s->view.echo, s->pose, s->view.aperture_m, &s->pathology, &s->view.settings,
                     &s->image);
   return sonde_echo_envelope(s->view.echo, &lines, &samples);

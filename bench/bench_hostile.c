@@ -153,7 +153,7 @@ static void update(scene *s, uint64_t tick, double dt_s) {
                         &(sonde_interior_input){sonde_state_positions(s->state),
                                                 sonde_state_contact_forces(s->state), s->pose,
                                                 &s->setup.pathology, dt_s, tick, s->probe.half_x_m,
-                                                s->probe.half_y_m, 0, SONDE_POSTURE_SUPINE});
+                                                s->probe.half_y_m, 0, SONDE_POSTURE_SUPINE, NULL});
 }
 
 // Presses until the force is reached, at most DEEPEST_M from the site.

@@ -51,7 +51,7 @@ static sonde_status draw(scene *s, const sonde_scanner *scanner, uint32_t number
                         &(sonde_interior_input){sonde_state_positions(s->state),
                                                 sonde_state_contact_forces(s->state), pose,
                                                 &s->pathology, -1, 1, s->probe.half_x_m,
-                                                s->probe.half_y_m, 0, SONDE_POSTURE_SUPINE});
+                                                s->probe.half_y_m, 0, SONDE_POSTURE_SUPINE, NULL});
   sonde_echo_def def = sonde_echo_def_default();
   def.seed = seed, def.scanner = scanner;
   sonde_echo *echo = NULL;

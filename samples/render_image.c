@@ -42,7 +42,8 @@ static sonde_status render(scene *s, const sonde_pathology *pathology, sonde_err
                                 s->probe.half_x_m,
                                 s->probe.half_y_m,
                                 0,
-                                SONDE_POSTURE_SUPINE};
+                                SONDE_POSTURE_SUPINE,
+                                NULL};
   sonde_interior_update(s->interior, &input);
   sonde_echo_settings settings = sonde_echo_settings_default();
   sonde_echo_render(s->echo, pose, 2 * s->probe.half_x_m, pathology, &settings, &s->image);

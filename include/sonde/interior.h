@@ -93,7 +93,7 @@ typedef enum sonde_interior_method {
 } sonde_interior_method;
 /** Method of the following updates; SOLID after a creation. @thread owner */
 SONDE_API void sonde_interior_set_method(sonde_interior *interior, sonde_interior_method method);
-/** Method that the last update used. @thread any */
+/** Method that the last update used; of a given tissue SOLID. @thread any */
 SONDE_API sonde_interior_method sonde_interior_used_method(const sonde_interior *interior);
 
 /** Moves the vein below a point of the skin, to the same depth along its whole course, and the
@@ -104,10 +104,21 @@ SONDE_API sonde_status sonde_interior_set_vein_depth(sonde_interior *interior,
                                                      sonde_vec3 below_skin_m, double depth_m,
                                                      sonde_error *error);
 
-/** What one update reads; all borrowed for the call. */
+/**
+ * Tissue that was solved elsewhere, in place of the interior's own solid, such as
+ * sonde_equilibrium_tissue() gives. Its functions are called by several threads at once.
+ */
+typedef struct sonde_interior_tissue {
+  /** Displacement (m) of a point of the leg at rest; beside the leg that of the nearest skin. */
+  sonde_vec3 (*moved)(const struct sonde_interior_tissue *self, sonde_vec3 rest_m);
+  /** Cauchy stress there: Pa, tension positive, world axes, without vessels. */
+  sonde_mat3 (*stress)(const struct sonde_interior_tissue *self, sonde_vec3 rest_m);
+} sonde_interior_tissue;
+
+/** What one update reads; all but the tissue borrowed for the call. */
 typedef struct sonde_interior_input {
-  const sonde_vec3 *positions_m;      /**< [nodes] deformed skin */
-  const sonde_vec3 *contact_forces_n; /**< [nodes] of the probe on the skin */
+  const sonde_vec3 *positions_m;      /**< [nodes] deformed skin; with a tissue not read */
+  const sonde_vec3 *contact_forces_n; /**< [nodes] of the probe on the skin; the same */
   sonde_pose world_from_probe;
   const sonde_pathology *pathology;
   double dt_s; /**< since the last update; < 0: vessels in equilibrium */
@@ -120,6 +131,9 @@ typedef struct sonde_interior_input {
   /** Of a limb: blood's own weight raises the groin's pressures below it. A model that says how it
    * lies (sonde_model.gravity) keeps to that. */
   sonde_posture posture;
+  /** Moves the inside and presses on its vessels; borrowed until the next update. NULL: the
+   * interior's own method. */
+  const sonde_interior_tissue *tissue;
 } sonde_interior_input;
 
 /** New surface state: solves the field, the stress at the vessels and their areas.

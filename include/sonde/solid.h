@@ -7,7 +7,7 @@
 #ifndef SONDE_SOLID_H
 #define SONDE_SOLID_H
 
-#include "sonde/tissue.h"
+#include "sonde/interior.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -169,6 +169,17 @@ SONDE_API sonde_status sonde_equilibrium_find(sonde_equilibrium *equilibrium, so
 /** Displacement (m) of a rest point; false outside of the mesh. @thread owner */
 SONDE_API bool sonde_equilibrium_at(const sonde_equilibrium *equilibrium, sonde_vec3 rest_m,
                                     sonde_vec3 *displacement_m);
+/**
+ * What a state does to the inside of the leg: displacement and stress of any point, for
+ * sonde_interior_input.tissue. A copy of the state; beside the mesh the nearest skin or bone
+ * counts.
+ * @param[out] tissue sonde_solid_tissue_destroy(); the mesh must outlive it
+ * @return MEMORY @thread owner
+ */
+SONDE_API sonde_status sonde_equilibrium_tissue(const sonde_equilibrium *equilibrium,
+                                                sonde_interior_tissue **tissue, sonde_error *error);
+/** NULL is ignored. @thread owner */
+SONDE_API void sonde_solid_tissue_destroy(sonde_interior_tissue *tissue);
 /** Goes back to a state: displacements of all nodes and the pose that they belong to. The next
  * sonde_equilibrium_find() of that pose starts from there, with no friction yet. @thread owner */
 SONDE_API void sonde_equilibrium_restore(sonde_equilibrium *equilibrium, sonde_pose pose,

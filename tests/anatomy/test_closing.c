@@ -37,7 +37,7 @@ static void press(const sonde_model *model, sonde_interior *in, const sonde_land
   sonde_interior_update(in, &(sonde_interior_input){sonde_state_positions(state),
                                                     sonde_state_contact_forces(state), path.pose,
                                                     &healthy, -1, 1, probe.half_x_m, probe.half_y_m,
-                                                    0, SONDE_POSTURE_SUPINE});
+                                                    0, SONDE_POSTURE_SUPINE, NULL});
   for (int which = 0; which < 2; ++which)
     assert_true(sonde_interior_vessel_at_plane(in, which, path.pose, &vessel[which]));
   sonde_state_destroy(state);

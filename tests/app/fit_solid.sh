@@ -21,8 +21,9 @@ gives 'tissue=solid friction>=0.5 force_n>=0.0999 force_n<=0.1001' press "$MODEL
 rejects '\--friction goes with --contact slip' solve "$MODEL" --site 27 --depths 1 --contact bonded --friction 0.5
 for mu in -0.1 nan 11; do rejects '\--friction' solve "$MODEL" --site 27 --depths 1 --friction $mu; done
 rejects '\--friction goes with --solid' press "$MODEL" --site 27 --depth-mm 1 --friction 0.5
-rejects '\--solid goes without --case' press "$MODEL" --solid --site 27 --depth-mm 1 --case healthy
-rejects '\--solid needs --site' press "$MODEL" --solid --depth-mm 1
+rejects "\--solid goes without --preset" press "$MODEL" --solid --site 27 --depth-mm 1 --preset none.yaml
+rejects "\--solid goes without --cuff-mmhg" press "$MODEL" --solid --site 27 --cuff-mmhg 30
+rejects 'names no stations' press "$MODEL" --solid --depth-mm 1
 rejects '\--moduli goes with --solid' press "$MODEL" --site 27 --depth-mm 1 --moduli "$work/moduli.csv"
 rejects 'site 99 has no measurements' "${fit[@]}" --at 99 -o "$work/none.csv"
 rejects '\--at: expected' "${fit[@]}" --at 1,x -o "$work/none.csv"

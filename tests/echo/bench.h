@@ -24,7 +24,7 @@ static inline void look(bench *b, const sonde_vec3 *positions) {
   b->interior->model = &b->leg.model; // the bench was returned by value
   sonde_interior_update(b->interior,
                         &(sonde_interior_input){p, b->forces, b->pose, &b->pathology, -1, 1,
-                                                INFINITY, INFINITY, 0, SONDE_POSTURE_SUPINE});
+                                                INFINITY, INFINITY, 0, SONDE_POSTURE_SUPINE, NULL});
   sonde_echo_render(b->echo, b->pose, 0.04, &b->pathology, &b->settings, &b->image);
 }
 

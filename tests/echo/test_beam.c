@@ -183,9 +183,9 @@ static void kernels_agree(void **state) {
   sonde_pathology_preset("healthy", &healthy, NULL);
   sonde_vec3 *forces = SONDE_NEW(sonde_vec3, b.leg.model.surface.vertex_count);
   sonde_pose pose = tube_pose(0.079, 0.15);
-  sonde_interior_update(b.interior, &(sonde_interior_input){b.leg.model.surface.vertices, forces,
-                                                            pose, &healthy, -1, 1, INFINITY,
-                                                            INFINITY, 0, SONDE_POSTURE_SUPINE});
+  sonde_interior_update(
+      b.interior, &(sonde_interior_input){b.leg.model.surface.vertices, forces, pose, &healthy, -1,
+                                          1, INFINITY, INFINITY, 0, SONDE_POSTURE_SUPINE, NULL});
   for (int k = 0; k < 2; ++k) assert_int_equal(sonde_image_create(300, 277, &image[k], NULL), 0);
   for (int curved = 0; curved < 2; ++curved) {
     assert_int_equal(sonde_echo_set_radius(b.view.echo, curved ? 0.06 : 0, NULL), 0);

@@ -14,7 +14,7 @@ static void look_with(bench *b, face f) {
   sonde_interior_update(b->interior,
                         &(sonde_interior_input){b->leg.model.surface.vertices, b->forces, b->pose,
                                                 &b->pathology, -1, 1, INFINITY, INFINITY, 0,
-                                                SONDE_POSTURE_SUPINE});
+                                                SONDE_POSTURE_SUPINE, NULL});
   sonde_echo_render(b->echo, b->pose, f.aperture_m, &b->pathology, &b->settings, &b->image);
 }
 

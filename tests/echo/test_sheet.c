@@ -88,7 +88,7 @@ static void look_at_pose(rig *r, const probe_kind *p) {
   sonde_interior_update(b->interior,
                         &(sonde_interior_input){b->leg.model.surface.vertices, b->forces, b->pose,
                                                 &b->pathology, -1, 1, INFINITY, INFINITY, 0,
-                                                SONDE_POSTURE_SUPINE});
+                                                SONDE_POSTURE_SUPINE, NULL});
   b->echo->frame.pathology = &b->pathology;
   sonde_echo_frame(b->echo, b->pose, p->aperture_m, &b->settings);
   sonde_echo_plane(b->echo);

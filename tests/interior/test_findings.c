@@ -66,7 +66,7 @@ static void press_for(limb *l, double force_n, double dent_m, double dt_s) {
       moved[i] = v_madd(skin->vertices[i], -dent_m * w, vec3(0, 1, 0));
     }
   sonde_interior_update(l->in, &(sonde_interior_input){moved, l->load, pose, &healthy, dt_s, 1,
-                                                       0.03, 0.006, 0, SONDE_POSTURE_SUPINE});
+                                                       0.03, 0.006, 0, SONDE_POSTURE_SUPINE, NULL});
   sonde_free(moved);
 }
 

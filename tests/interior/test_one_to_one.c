@@ -86,11 +86,11 @@ static void press(scene *s, const sonde_site *site, const char *probe) {
     double force = -v_dot(sonde_state_contact(s->state)->force_n, beam);
     if (force > hardest_n) break;
     s->hardest_n = fmax(s->hardest_n, force), ++s->states;
-    sonde_interior_update(s->interior,
-                          &(sonde_interior_input){sonde_state_positions(s->state),
-                                                  sonde_state_contact_forces(s->state), s->pose,
-                                                  &s->pathology, -1, k, s->probe.half_x_m,
-                                                  s->probe.half_y_m, 0, SONDE_POSTURE_SUPINE});
+    sonde_interior_update(s->interior, &(sonde_interior_input){sonde_state_positions(s->state),
+                                                               sonde_state_contact_forces(s->state),
+                                                               s->pose, &s->pathology, -1, k,
+                                                               s->probe.half_x_m, s->probe.half_y_m,
+                                                               0, SONDE_POSTURE_SUPINE, NULL});
     look_for_folds(s);
   }
   sonde_probe_clear(&s->probe);

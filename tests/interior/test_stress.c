@@ -3,37 +3,6 @@
 #include "interior/window.h"
 #include "interior/vessels.h"
 
-typedef struct stress_row {
-  double penetration_m, force_n;
-  char point[12];
-  double xx, yy, zz; // Pa, tension positive
-} stress_row;
-
-static uint32_t read_stress(stress_row *rows, uint32_t capacity) {
-  FILE *file = fopen(SONDE_SOURCE_DIR "/tests/data/vein_compression/stress_no_vessel.csv", "r");
-  char line[512];
-  uint32_t count = 0;
-  while (file != NULL && count < capacity && fgets(line, sizeof line, file) != NULL) {
-    double v[3], xx, yy, zz;
-    stress_row *r = &rows[count];
-    if (sscanf(line, "novessel,%lf,%lf,%lf,%11[a-z0-9],%lf,%lf,%lf", &v[0], &v[1], &v[2], r->point,
-               &xx, &yy, &zz) != 7)
-      continue;
-    *r = (stress_row){.penetration_m = v[0] * 1e-3,
-                      .force_n = v[1],
-                      .xx = xx * 1e3,
-                      .yy = yy * 1e3,
-                      .zz = zz * 1e3,
-                      .point = {0}};
-    (void)sscanf(line, "novessel,%*f,%*f,%*f,%11[a-z0-9]", r->point);
-    ++count;
-  }
-  if (file != NULL) fclose(file);
-  return count;
-}
-
-static double effective(double xx, double yy, double zz) { return -(2 * (xx + yy) - zz) / 3; }
-
 static void stress_follows_the_study(void **state) {
   (void)state;
   static stress_row rows[200];

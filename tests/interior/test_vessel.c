@@ -185,7 +185,7 @@ static sonde_interior *loaded(const tube *t, double force, const char *name, dou
     }
   sonde_interior_update(in,
                         &(sonde_interior_input){t->model.surface.vertices, load, pose, &p, dt, 1,
-                                                INFINITY, INFINITY, 0, SONDE_POSTURE_SUPINE});
+                                                INFINITY, INFINITY, 0, SONDE_POSTURE_SUPINE, NULL});
   if (dt < 0) return in;
   sonde_free(load);
   return in;

@@ -55,7 +55,7 @@ static double press(const sonde_limb_station *station, double force_n,
   sonde_interior_update(in, &(sonde_interior_input){sonde_state_positions(state),
                                                     sonde_state_contact_forces(state), path.pose,
                                                     &healthy, -1, 1, probe.half_x_m, probe.half_y_m,
-                                                    0, SONDE_POSTURE_SUPINE});
+                                                    0, SONDE_POSTURE_SUPINE, NULL});
   for (uint32_t k = 0; k < station->veins; ++k) {
     sonde_vec3 at = sonde_limb_vessel_place(limb, station->vein[k], station->arc_m[k]).centre_m;
     area[k] = state_at(sonde_limb_to_model(limb, at))->area_ratio;

@@ -54,7 +54,7 @@ static void update(bench *b, const char *name, double venous_mmhg, double push_n
   b->interior->model = &b->leg.model; // the bench was returned by value
   sonde_interior_update(b->interior,
                         &(sonde_interior_input){b->positions, b->forces, b->press.pose, &p, -1, 1,
-                                                0.02, 5e-3, 0, SONDE_POSTURE_SUPINE});
+                                                0.02, 5e-3, 0, SONDE_POSTURE_SUPINE, NULL});
 }
 
 static bench make(void) {

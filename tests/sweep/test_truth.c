@@ -142,7 +142,7 @@ static void limb(void **state) {
     }
     sonde_interior_update(interior,
                           &(sonde_interior_input){skin, forces, pose, &pathology, -1, 7, INFINITY,
-                                                  INFINITY, 0, SONDE_POSTURE_SUPINE});
+                                                  INFINITY, 0, SONDE_POSTURE_SUPINE, NULL});
     sonde_echo_render(echo, pose, 0.04, &pathology, &settings, &image);
     sonde_truth t;
     assert_int_equal(sonde_truth_create(echo, &image, &t, NULL), SONDE_OK);

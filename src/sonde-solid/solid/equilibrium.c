@@ -2,7 +2,6 @@
 #include "equilibrium.h"
 
 #include "base/base.h"
-#include "elements/hexahedron.h"
 #include "haptics/motion.h"
 
 #include <string.h>
@@ -287,54 +286,6 @@ done:
 }
 
 // ---- reading ------------------------------------------------------------------------------
-
-// Local coordinates of a point in a hexahedron; false: it lies outside.
-static bool locate(const sonde_vec3 corner[8], sonde_vec3 p, double shape[8]) {
-  double at[3] = {0, 0, 0};
-  for (int step = 0; step < 20; ++step) {
-    sonde_vec3 g[8], x = vec3(0, 0, 0);
-    (void)sonde_hexahedron_gradients(corner, at[0], at[1], at[2], g);
-    double move[3] = {0, 0, 0};
-    for (int n = 0; n < 8; ++n) {
-      const double *s = sonde_hexahedron_sign[n];
-      shape[n] = (1 + s[0] * at[0]) * (1 + s[1] * at[1]) * (1 + s[2] * at[2]) / 8;
-      x = v_madd(x, shape[n], corner[n]);
-    }
-    // Local coordinates are functions of place with gradients sum of sign g.
-    for (int n = 0; n < 8; ++n)
-      for (int k = 0; k < 3; ++k) move[k] += sonde_hexahedron_sign[n][k] * v_dot(g[n], v_sub(p, x));
-    double most = 0;
-    for (int k = 0; k < 3; ++k) at[k] += move[k], most = fmax(most, fabs(move[k]));
-    if (most < 1e-12) break;
-    if (fabs(at[0]) > 3 || fabs(at[1]) > 3 || fabs(at[2]) > 3) return false;
-  }
-  const double edge = 1 + 1e-6;
-  return fabs(at[0]) <= edge && fabs(at[1]) <= edge && fabs(at[2]) <= edge;
-}
-
-bool sonde_equilibrium_at(const sonde_equilibrium *e, sonde_vec3 rest_m,
-                          sonde_vec3 *displacement_m) {
-  SONDE_ASSERT(e != NULL && displacement_m != NULL);
-  for (uint32_t h = 0; h < e->mesh->count; ++h) {
-    sonde_vec3 corner[8], low, high;
-    double shape[8];
-    for (int c = 0; c < 8; ++c) {
-      corner[c] = e->mesh->node[e->mesh->corner[h][c]];
-      low = c ? v_min(low, corner[c]) : corner[c];
-      high = c ? v_max(high, corner[c]) : corner[c];
-    }
-    const double slack = 1e-9;
-    if (rest_m.x < low.x - slack || rest_m.y < low.y - slack || rest_m.z < low.z - slack ||
-        rest_m.x > high.x + slack || rest_m.y > high.y + slack || rest_m.z > high.z + slack ||
-        !locate(corner, rest_m, shape))
-      continue;
-    *displacement_m = vec3(0, 0, 0);
-    for (int c = 0; c < 8; ++c)
-      *displacement_m = v_madd(*displacement_m, shape[c], e->moved[e->mesh->corner[h][c]]);
-    return true;
-  }
-  return false;
-}
 
 void sonde_equilibrium_restore(sonde_equilibrium *e, sonde_pose pose,
                                const sonde_vec3 *displacement_m) {

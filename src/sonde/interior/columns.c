@@ -340,6 +340,7 @@ void sonde_columns_refresh(sonde_interior *in) {
   SONDE_ASSERT(in != NULL && in->field != NULL);
   store_layers(in);
   in->live->ready = in->next->ready = in->building = in->solid = false;
+  in->tissue = NULL;
   for (uint32_t k = 0; k < in->cache_count; ++k)
     if (in->cache[k]) in->cache[k]->ready = false;
 }

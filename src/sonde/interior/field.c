@@ -160,6 +160,7 @@ sonde_vec3 sonde_interior_column_field(const sonde_interior *in, sonde_vec3 rest
 
 // Beyond the ends of the window the solid is at rest.
 sonde_vec3 sonde_interior_field(const sonde_interior *in, sonde_vec3 rest) {
+  if (in->tissue != NULL) return in->tissue->moved(in->tissue, rest);
   polar q = to_polar(in, rest);
   if (!in->solid) {
     sonde_vec3 kept, plain = column_field(in, q);
@@ -210,9 +211,13 @@ bool sonde_interior_stress(const sonde_interior *in, sonde_vec3 rest, sonde_mat3
   SONDE_ASSERT(in != NULL && stress != NULL);
   sonde_column_point at;
   *stress = m_zero();
-  if (!in->solid || !sonde_interior_locate(in, rest, &at)) return false;
+  if (!(in->solid || in->tissue) || !sonde_interior_locate(in, rest, &at)) return false;
   // A limb's column calls bone what lies below an outer bone: vessels there take the stress on it.
   if (at.depth_m < 0 || (in->bone == NULL && at.r <= at.bone_m)) return false;
+  if (in->tissue != NULL) {
+    *stress = in->tissue->stress(in->tissue, rest);
+    return true;
+  }
   sonde_mat3 local, world_from_leg = m_columns(in->e1, in->e2, in->axis);
   if (!sonde_window_stress(in->live, at.theta, at.s, at.r, &local)) return false;
   *stress = m_mul(world_from_leg, m_mul(local, m_transpose(world_from_leg)));

@@ -159,7 +159,7 @@ sonde_status sonde_interior_recall(sonde_interior *in, const sonde_interior_memo
   }
   if (m->building) sonde_interior_next_window(in, m->next);
   in->building = m->building, in->built = m->built;
-  in->ready = m->ready, in->tick = m->tick, in->solid = false;
+  in->ready = m->ready, in->tick = m->tick, in->solid = false, in->tissue = NULL;
   for (uint32_t which = 0, at = 0; which < in->vessel_count; ++which)
     for (uint32_t i = 0; i < in->course[which].count; ++i, ++at) {
       in->state[which][i].area_ratio = m->area_ratio[at];

@@ -73,5 +73,5 @@ void sonde_interior_wait(sonde_interior *interior, bool waits) {
 
 sonde_interior_method sonde_interior_used_method(const sonde_interior *interior) {
   SONDE_ASSERT(interior != NULL);
-  return interior->solid ? SONDE_INTERIOR_SOLID : SONDE_INTERIOR_COLUMNS;
+  return interior->solid || interior->tissue ? SONDE_INTERIOR_SOLID : SONDE_INTERIOR_COLUMNS;
 }

@@ -123,10 +123,10 @@ struct sonde_interior {
   bool building;                         // next has a footprint and is not in use yet
   bool ahead;                            // the coming update's share of it is done
   uint32_t built, whole;                 // updates that it has been building, that a build takes
-  struct sonde_window **cache; // [cache_count] factored windows of other footprints, latest first;
-                               // NULL before it is needed
+  struct sonde_window **cache; // [cache_count] of other footprints, factored, latest first, or NULL
   uint32_t cache_count;        // 0 in a running session
-  bool solid;                  // the last update was solved by the solid
+  bool solid;                  // the last update was solved by the solid of the window
+  const sonde_interior_tissue *tissue; // of the last update; NULL: the window or the columns
   sonde_interior_method method;
   bool vessels_only;     // of the updates: no tissue is read beside the vessels
   bool waits;            // of the updates: for their windows
@@ -238,9 +238,9 @@ sonde_vec3 sonde_rectangle_stress(double pressure_pa, double half_x_m, double ha
 // @thread any
 void sonde_interior_displacements(const sonde_interior *interior, uint32_t count,
                                   const sonde_vec3 *rest_m, sonde_vec3 *out_m);
-// Cauchy stress (Pa, tension positive, world axes) at a rest point, scaled so that the solid's
-// reaction is the contact force; without vessels. @return false (zero stress) where the solid does
-// not reach: no contact, outside the leg or its window, in a thigh's bone. @thread any
+// Cauchy stress (Pa, tension positive, world axes) at a rest point, of the window scaled so that
+// its reaction is the contact force; without vessels. @return false (zero stress) where the solid
+// does not reach: no contact, outside the leg or its window, in a thigh's bone. @thread any
 bool sonde_interior_stress(const sonde_interior *interior, sonde_vec3 rest_m, sonde_mat3 *stress);
 // Sections of the vein (0), the artery (1) or a branch; 0 when the leg lacks it.
 // @thread any, not during an update

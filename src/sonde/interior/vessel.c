@@ -61,6 +61,7 @@ static load measure_load(const sonde_model *model, const sonde_interior_input *i
   load l = {.x = m_column(&r, 0), .y = m_column(&r, 1), .beam = m_column(&r, 2)};
   double low_x = INFINITY, high_x = -INFINITY, low_y = INFINITY, high_y = -INFINITY, largest = 0;
   double force = 0, sum_x = 0, sum_y = 0, sum_xx = 0, sum_yy = 0;
+  if (input->tissue != NULL) return l; // which has the stress itself
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i)
     largest = fmax(largest, v_dot(input->contact_forces_n[i], l.beam));
   for (uint32_t i = 0; i < model->surface.vertex_count; ++i) {
@@ -91,11 +92,11 @@ static double effective(double trace, double axial) {
   return fmax(0, (4 * 0.5 * (trace - axial) - axial) / 3);
 }
 
-// Effective pressure on a vessel's wall: from the solid's stress, and until the solid is factored
-// from the half space under the equivalent rectangle.
+// Effective pressure on a vessel's wall: from the stress of the given tissue or of the solid, and
+// until the solid is factored from the half space under the equivalent rectangle.
 static double pressure_on(const sonde_interior *in, const sonde_vessel_section *section,
                           const load *l) {
-  if (in->solid && in->live->stress_scale > 0) {
+  if (in->tissue != NULL || (in->solid && in->live->stress_scale > 0)) {
     sonde_mat3 s;
     if (!sonde_interior_stress(in, section->rest_m, &s)) return 0;
     double axial = -v_dot(section->axis, m_mul_v(s, section->axis));
@@ -437,11 +438,12 @@ void sonde_interior_vessels(sonde_interior *in, const sonde_interior_input *inpu
 
 void sonde_interior_update(sonde_interior *in, const sonde_interior_input *input) {
   SONDE_ASSERT(in != NULL && input != NULL && input->pathology != NULL);
-  SONDE_ASSERT(input->positions_m != NULL && input->contact_forces_n != NULL);
+  SONDE_ASSERT(input->tissue != NULL || (input->positions_m != NULL && input->contact_forces_n));
   SONDE_ASSERT(input->face_half_x_m > 0 && input->face_half_y_m > 0);
   sonde_findings_apply(in, input->pathology);
-  in->solid = sonde_interior_follow(in, input);
-  if (!in->solid) {
+  in->tissue = input->tissue;
+  in->solid = in->tissue == NULL && sonde_interior_follow(in, input);
+  if (!in->solid && in->tissue == NULL) {
     sonde_interior_solve(in, input->positions_m);
     if (in->vessels_only)
       in->column_grid->strength = 0;
