@@ -18,6 +18,11 @@ gives 'contact=slip friction>=0.5 friction<=0.5' solve "$MODEL" --site 27 --dept
   --moduli "$work/moduli.csv" --json
 gives 'tissue=solid friction>=0.5 force_n>=0.0999 force_n<=0.1001' press "$MODEL" --solid --site 27 --force-n 0.1 --friction 0.5 \
   --moduli "$work/moduli.csv" --json
+# The solid moves vessels and pictures: under 8 N the bundled thigh's vein closes, a fresh clot holds it open.
+gives 'tissue=solid vein_area_ratio<=0.05 artery_area_ratio>=0.9' press "$MODEL" --solid --site 27 --force-n 8 --json
+gives 'tissue=solid vein_area_ratio>=0.7 case=acute_occlusive' press "$MODEL" --solid --site 27 --force-n 8 \
+  --case acute_occlusive --image "$work/inside.png" --json
+[[ $(head -c 4 "$work/inside.png" | tail -c 3) == PNG ]] || wrong "press --solid --image wrote no PNG"
 rejects '\--friction goes with --contact slip' solve "$MODEL" --site 27 --depths 1 --contact bonded --friction 0.5
 for mu in -0.1 nan 11; do rejects '\--friction' solve "$MODEL" --site 27 --depths 1 --friction $mu; done
 rejects '\--friction goes with --solid' press "$MODEL" --site 27 --depth-mm 1 --friction 0.5
