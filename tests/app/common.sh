@@ -19,8 +19,8 @@ run() { # ARGUMENTS: runs sonde, keeps its output, sets status
   timeout 900 "$SONDE" "$@" >"$out" 2>"$err" </dev/null || status=$?
 }
 
-# A fingerprint of everything that a command might have touched.
-fingerprint() { (cd "$work" && find in out -printf '%p %s %y\n' | sort && find in -type f -exec cksum {} +); }
+# A fingerprint of everything that a command might have touched: names of all, size, number and times of files.
+fingerprint() { find "$work/out" "$work/in" \( -type f -printf '%p %s %i %T@ %C@\n' \) -o -printf '%p %y %l\n'; }
 
 # rejects WORD ARGUMENTS: sonde exits with 2, says WORD on stderr, prints nothing and writes nothing.
 rejects() {

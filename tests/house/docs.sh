@@ -6,8 +6,7 @@ root=$1
 wrong=0
 cd "$root"
 while IFS=: read -r page name; do
-  file=$(cut -d'`' -f2 <<<"$name")
-  function=$(cut -d'`' -f4 <<<"$name")
+  IFS='`' read -r _ file _ function _ <<<"$name"
   if [[ ! -e $file ]]; then
     echo "$page: $file is not there"
     wrong=$((wrong + 1))
@@ -20,7 +19,8 @@ while IFS=: read -r page link; do
   target=${link#](}
   target=${target%%#*}
   target=${target%)}
-  [[ -z $target || $target == *://* || -e $(dirname "$page")/$target ]] && continue
+  [[ $page == */* ]] && folder=${page%/*} || folder=.
+  [[ -z $target || $target == *://* || -e $folder/$target ]] && continue
   echo "$page: the link to $target leads nowhere"
   wrong=$((wrong + 1))
 done < <(grep -oE '\]\([^) ]+\)' docs/*.md docs/decisions/*.md README.md CONTRIBUTING.md || true)

@@ -2,68 +2,45 @@
 # includes.sh ROOT: a room includes only itself and the rooms above it in src/rooms.txt; app/ and
 # samples/ include public headers only.
 set -euo pipefail
-root=$1
-mapfile -t rooms < <(sed -nE 's/^[^# ]+ +([a-z_]+) .*/\1/p' "$root/src/rooms.txt")
-mapfile -t folders < <(sed -nE 's/^([^# ]+) +([a-z_]+) .*/\1\/\2/p' "$root/src/rooms.txt")
-bad=0
+root=$1 list=$(mktemp)
+trap 'rm -f "$list"' EXIT
+public=$root/include/sonde
+while read -r library room; do
+  find "$root/src/$library/$room" "$public/$room.h" "$public/${room}_"*.h -name '*.[ch]' -printf "$room %p\n" 2>/dev/null || true
+done < <(sed -nE 's/^([^# ]+) +([a-z_]+) .*/\1 \2/p' "$root/src/rooms.txt") >"$list"
+find "$root/app" "$root/samples" -name '*.[ch]' -printf '- %p\n' >>"$list" 2>/dev/null || true
 
-rank() {
-  local i
-  for i in "${!rooms[@]}"; do
-    [[ ${rooms[i]} == "$1" ]] && { echo "$i"; return; }
-  done
-  echo -1
-}
-
-complain() {
-  echo "$1: includes \"$2\": $3"
-  bad=$((bad + 1))
-}
-
-quoted_includes() { sed -n 's/^[ \t]*#[ \t]*include[ \t]*"\([^"]*\)".*/\1/p' "$1"; }
-
-# A file of a room, inside (src/) or public (include/sonde/).
-check_room_file() { # FILE RANK
-  local include target
-  while read -r include; do
-    case $include in
-    *..*) complain "$1" "$include" "no way up the tree" ;;
-    sonde/*) target=${include#sonde/} target=${target%.h} target=${target%%_*} ;; # a room's second header
-    */*) target=${include%%/*} ;;
-    *) [[ -e $(dirname "$1")/$include ]] || complain "$1" "$include" "not in the same directory"
-      continue ;;
-    esac
-    local other
-    other=$(rank "${target-}")
-    if ((other < 0)); then complain "$1" "$include" "not a room"
-    elif ((other > $2)); then complain "$1" "$include" "that room is below ${rooms[$2]}"; fi
-  done < <(quoted_includes "$1")
-}
-
-check_outsider() { # FILE
-  local include
-  while read -r include; do
-    case $include in
-    sonde/*) [[ -e $root/include/$include ]] || complain "$1" "$include" "no such header" ;;
-    */*) complain "$1" "$include" "only sonde/ headers are public" ;;
-    *) [[ -e $(dirname "$1")/$include ]] || complain "$1" "$include" "not in the same directory" ;;
-    esac
-  done < <(quoted_includes "$1")
-  if grep -nE '^[ \t]*#[ \t]*include[ \t]*<sonde' "$1"; then complain "$1" "<sonde...>" "use quotes"; fi
-}
-
-files=0
-for i in "${!rooms[@]}"; do
-  while read -r file; do
-    check_room_file "$file" "$i"
-    files=$((files + 1))
-  done < <(find "$root/src/${folders[i]}" "$root/include/sonde/${rooms[i]}.h" \
-    "$root/include/sonde/${rooms[i]}_"*.h -name '*.[ch]' 2>/dev/null)
-done
-while read -r file; do
-  check_outsider "$file"
-  files=$((files + 1))
-done < <(find "$root/app" "$root/samples" -name '*.[ch]' 2>/dev/null)
-
-echo "$files files, $bad wrong includes"
-((files > 0 && bad == 0))
+# A line with the room (- for an outsider), one with the path.
+sed 's/ /\n/' "$list" |
+  awk -v rooms="$(sed -nE 's/^[^# ]+ +([a-z_]+) .*/\1/p' "$root/src/rooms.txt" | tr '\n' ' ')" -v root="$root" '
+    BEGIN { n = split(rooms, name, " "); for (i = 1; i <= n; ++i) rank[name[i]] = i }
+    function complain(what) { print file ": includes \"" include "\": " what; bad++ }
+    function is_there(path,   line, there) { there = (getline line <path) >= 0; close(path); return there }
+    function near() { path = file; sub(/[^\/]*$/, include, path); if (!is_there(path)) complain("not in the same directory") }
+    function of_room(   target) {
+      if (include ~ /\.\./) { complain("no way up the tree"); return }
+      if (include !~ /\//) { near(); return }
+      target = include
+      if (sub(/^sonde\//, "", target)) { sub(/\.h$/, "", target); sub(/_.*/, "", target) } # a room has further headers
+      else sub(/\/.*/, "", target)
+      if (!(target in rank)) complain("not a room")
+      else if (rank[target] > rank[room]) complain("that room is below " room)
+    }
+    function of_outsider() {
+      if (include ~ /^sonde\//) { if (!is_there(root "/include/" include)) complain("no such header") }
+      else if (include ~ /\//) complain("only sonde/ headers are public")
+      else near()
+    }
+    NR % 2 { room = $0; next }
+    {
+      file = $0
+      files++
+      while ((getline line <file) > 0) {
+        if (line !~ /^[ \t]*#[ \t]*include/) continue
+        include = line
+        if (sub(/^[ \t]*#[ \t]*include[ \t]*"/, "", include)) { sub(/".*/, "", include); if (room == "-") of_outsider(); else of_room() }
+        else if (room == "-" && line ~ /<sonde/) { include = "<sonde...>"; complain("use quotes") }
+      }
+      close(file)
+    }
+    END { print files + 0 " files, " bad + 0 " wrong includes"; exit bad > 0 || files == 0 }'

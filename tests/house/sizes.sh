@@ -47,28 +47,29 @@ while read -r length place name; do
   ((length <= 80)) || fail "$place: $name has $length lines, expected 80 or fewer"
 done <"$list"
 
-for file in "${all[@]}"; do
-  lines=$(wc -l <"$file") limit=800
+while read -r lines file; do
+  limit=800
   [[ $file == *.h ]] && limit=250
-  ((lines <= limit)) || fail "$file has $lines lines, expected $limit or fewer"
-done
-while read -r file; do
-  lines=$(wc -l <"$file")
-  ((lines <= 80)) || fail "$file has $lines lines, expected 80 or fewer in a sample"
-done < <(find "$root/samples" -name '*.c' 2>/dev/null)
+  [[ $file == total ]] || ((lines <= limit)) || fail "$file has $lines lines, expected $limit or fewer"
+  [[ $file != "$root"/samples/*.c ]] || ((lines <= 80)) || fail "$file has $lines lines, expected 80 or fewer in a sample"
+done < <(wc -l "${all[@]}")
 
 # A static function that its file names once besides the definition is a single use: a reader has to
 # leave the caller for it. A function whose address stands in a table or is passed on cannot be written in place: it is
 # counted apart. Comments, strings and declarations do not count.
-single() { # FILE...: each function called once; "total, static functions, called once, used once or called once"
-  awk '
-    function close_file(  f) {
+single() { # FILE...: each function called once; "room ROOM, static functions, called once"; "total, static functions, called once, used once or called once"
+  awk -v root="$root/" '
+    function close_file(  f, room) {
+      room = substr(name, length(root) + 1)
+      if (room ~ /^app/) room = "app/"; else match(room, /^[^\/]*\/[^\/]*\/[^\/]*\//) && room = substr(room, 1, RLENGTH)
       for (f in line) {
         total++
+        of_room[room]++
         if (uses[f] - 1 - declared[f] > 1) continue
         once++
         if (calls[f] - 1 - declared[f] < 1) continue
         called++
+        called_of[room]++
         print "once", name ":" line[f], f
       }
       delete line; delete uses; delete calls; delete declared
@@ -97,52 +98,65 @@ single() { # FILE...: each function called once; "total, static functions, calle
         }
       }
     }
-    END { close_file(); print "total", total + 0, called + 0, once + 0 }
+    END {
+      close_file()
+      for (f in of_room) print "room", f, of_room[f], called_of[f] + 0
+      print "total", total + 0, called + 0, once + 0
+    }
   ' "$@"
 }
 mapfile -t bodies < <(find "$root/src" "$root/app" -name '*.c')
 single "${bodies[@]}" >"$list"
 read -r _ total called once < <(tail -1 "$list")
-share() { echo $((total ? 100 * $1 / total : 0)); }
-echo "$called of $total static functions ($(share called) %) are called once and used nowhere else;" \
-  "$once ($(share once) %) with those whose address is taken once"
+echo "$called of $total static functions ($((total ? 100 * called / total : 0)) %) are called once and used nowhere else;" \
+  "$once ($((total ? 100 * once / total : 0)) %) with those whose address is taken once"
 ((called * 100 <= MOST_SINGLE * total)) || fail "$called of $total static functions are called once, expected $MOST_SINGLE % or fewer"
 ((once * 100 <= MOST_RAW * total)) ||
   fail "$once of $total static functions are called once or have their address taken once, expected $MOST_RAW % or fewer"
 
-for room in "$root"/src/*/*/ "$root/app/"; do
-  mapfile -t inside < <(find "$room" -name '*.c')
-  ((${#inside[@]} > 0)) || continue
-  single "${inside[@]}" >"$list"
-  read -r _ total called once < <(tail -1 "$list")
-  ((total > 0)) || continue
-  echo "${room#"$root"/}: $called of $total static functions ($(share called) %) are called once"
+while read -r _ room total called; do
+  echo "$room: $called of $total static functions ($((total ? 100 * called / total : 0)) %) are called once"
   # A room of a few functions has no share worth a bound.
   ((total < 15 || called * 100 <= MOST_OF_ROOM * total)) ||
-    fail "${room#"$root"/}: $called of $total static functions are called once, expected $MOST_OF_ROOM % or fewer"
-done
+    fail "$room: $called of $total static functions are called once, expected $MOST_OF_ROOM % or fewer"
+done < <(grep '^room ' "$list" | sort)
 
 # The comment at the head of a file says what the file does; a table of its functions is no help.
-for file in "${bodies[@]}"; do
-  head=$(awk '!/^\/\// && !/^ ?\*/ && !/^\/\*/ { exit } { n++ } END { print n + 0 }' "$file")
+while read -r head file; do
   ((head <= MOST_HEAD)) || fail "$file begins with $head lines of comment, expected $MOST_HEAD or fewer"
-done
+done < <(awk '
+  function told() { if (file != "") print n + 0, file }
+  FNR == 1 { told(); file = FILENAME; n = 0; ended = 0 }
+  !/^\/\// && !/^ ?\*/ && !/^\/\*/ { ended = 1 }
+  !ended { n++ }
+  END { told() }' "${bodies[@]}")
 
-asserts() { # PER_1000 WHAT FILE...
-  local least=$1 what=$2 lines count
-  shift 2
-  lines=$(cat "$@" | wc -l)
-  count=$(cat "$@" | grep -v '#define' | grep -oE '\b(SONDE_ASSERT|_Static_assert|assert)\(' | wc -l || true)
-  ((count * 1000 >= least * lines)) || fail "$what: $count asserts in $lines lines, expected $least per 1000"
-  echo "$what: $((count * 1000 / lines)) asserts per 1000 lines"
-}
-mapfile -t inside < <(find "$root/src" -name '*.[ch]')
-asserts 15 src "${inside[@]}"
-for room in "$root"/src/*/*/; do
-  mapfile -t inside < <(find "$room" -name '*.[ch]')
-  ((${#inside[@]} > 0)) || continue
-  (($(cat "${inside[@]}" | wc -l) < 200)) || asserts "$LEAST_ASSERTS" "${room#"$root"/}" "${inside[@]}"
-done
-mapfile -t inside < <(find "$root/app" -name '*.[ch]')
-(($(cat "${inside[@]}" | wc -l) < 200)) || asserts "$LEAST_ASSERTS" app/ "${inside[@]}"
+mapfile -t inner < <(find "$root/src" "$root/app" -name '*.[ch]')
+# "ROOM lines asserts" for src as a whole and for each room; what a macro is defined as does not count.
+while read -r room lines count; do
+  least=$LEAST_ASSERTS
+  [[ $room == src ]] && least=15
+  [[ $room == src ]] || ((lines >= 200)) || continue
+  ((count * 1000 >= least * lines)) || fail "$room: $count asserts in $lines lines, expected $least per 1000"
+  echo "$room: $((count * 1000 / lines)) asserts per 1000 lines"
+done < <(awk -v root="$root/" '
+    FNR == 1 {
+      room = substr(FILENAME, length(root) + 1)
+      if (room ~ /^app/) room = "app/"; else match(room, /^[^\/]*\/[^\/]*\/[^\/]*\//) && room = substr(room, 1, RLENGTH)
+    }
+    { lines[room]++ }
+    !/#define/ {
+      text = $0
+      while (match(text, /(SONDE_ASSERT|_Static_assert|assert)\(/)) {
+        if (RSTART == 1 || substr(text, RSTART - 1, 1) !~ /[A-Za-z0-9_]/) asserts[room]++
+        text = substr(text, RSTART + RLENGTH)
+      }
+    }
+    END {
+      for (room in lines) {
+        print room, lines[room], asserts[room] + 0
+        if (room !~ /^app/) { all += lines[room]; said += asserts[room] }
+      }
+      print "src", all + 0, said + 0
+    }' "${inner[@]}" | sort)
 ((bad == 0))
