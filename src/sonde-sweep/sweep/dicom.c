@@ -28,19 +28,16 @@ static const uint32_t UNDEFINED_LENGTH = 0xffffffff; // items end by a mark
 // Marks of a sequence's items as they stand in the file: group first.
 static const uint32_t ITEM = 0xe000fffe, ITEM_ENDS = 0xe00dfffe, SEQUENCE_ENDS = 0xe0ddfffe;
 
-static bool has_long_length(const char vr[2]) {
-  static const char *const list[] = {"OB", "SQ", "UN", "UT"};
-  for (size_t k = 0; k < sizeof list / sizeof *list; ++k)
-    if (memcmp(vr, list[k], 2) == 0) return true;
-  return false;
-}
-
 // Head of an element: its tag, its kind, its length in bytes.
 static void put_head(bytes_cursor *out, uint32_t tag, const char vr[2], uint32_t length) {
   bytes_u16(out, (uint16_t)(tag >> 16));
   bytes_u16(out, (uint16_t)(tag & 0xffff));
   bytes_put(out, vr, 2);
-  if (has_long_length(vr)) {
+  static const char has_long_length[][3] = {"OB", "SQ", "UN", "UT"};
+  bool is_long = false;
+  for (size_t k = 0; k < SONDE_COUNT_OF(has_long_length); ++k)
+    is_long = is_long || memcmp(vr, has_long_length[k], 2) == 0;
+  if (is_long) {
     bytes_u16(out, 0);
     bytes_u32(out, length);
   } else {

@@ -49,14 +49,6 @@ static bool read_at(const pose_content *c, uint32_t frame, double x, double y, d
   return true;
 }
 
-// Adds to d grey / d motion of a frame what its point at y moves by when the frame moves.
-static void add_source(double motion[POSE_AXES], const double by[3], const double y[3]) {
-  for (int a = 0; a < 3; ++a) motion[a] -= by[a];
-  motion[3] -= by[2] * y[1] - by[1] * y[2];
-  motion[4] -= by[0] * y[2] - by[2] * y[0];
-  motion[5] -= by[1] * y[0] - by[0] * y[1];
-}
-
 // The point at (x, y) of frame i, between two of the views; adds nothing where it is not.
 static void add_point(const pose_content *c, uint32_t i, const view *views, int count, double x,
                       double y, pose_terms *to) {
@@ -85,7 +77,12 @@ static void add_point(const pose_content *c, uint32_t i, const view *views, int 
   for (int side = 0; side < 2; ++side) {
     const double by[3] = {-scale * share[side] * slope[side][0],
                           -scale * share[side] * slope[side][1], by_share * share[side] / gap};
-    add_source(motion[side], by, foot[side]);
+    // d grey / d motion of that frame: its point moves when the frame moves.
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, c2 = (a + 2) % 3;
+      motion[side][a] = -by[a];
+      motion[side][3 + a] = -(by[c2] * foot[side][b] - by[b] * foot[side][c2]);
+    }
     // The same point, moved with frame i: its step in the other's axes, turned into those of i.
     double own_by[3];
     for (int a = 0; a < 3; ++a)

@@ -24,9 +24,6 @@ static const sonde_model_kernels models[] = {
 #undef X
 };
 
-// Of face_marked.
-static size_t mark_words(const sonde_batches *l) { return l->face_batch_count / 64 + 1; }
-
 static real upper(real a, real b) { return b > a ? b : a; }
 
 #define CARVE(field, count) (l->field = sonde_carve(base, &offset, (count), sizeof *l->field))
@@ -45,7 +42,7 @@ static size_t carve(sonde_batches *l, uint32_t faces, char *base) {
   CARVE(place, seen * SONDE_RECORD), CARVE(direction, seen * SONDE_QUAD);
   CARVE(seen, l->seen_count), CARVE(seen_at, l->seen_count > 0 ? rows : 0);
   CARVE(awake, batches), CARVE(common.is_awake, batches), CARVE(common.calm, batches);
-  CARVE(face_marked, mark_words(l)), CARVE(face_code, face_batches);
+  CARVE(face_marked, l->face_batch_count / 64 + 1), CARVE(face_code, face_batches);
   CARVE(is_near, batches), CARVE(near_list, batches);
   CARVE(speed2, groups * SONDE_BATCH), CARVE(moved2, groups * SONDE_BATCH);
   CARVE(unrest2, batches), CARVE(common.published, batches), CARVE(touched_rows, batches);

@@ -166,16 +166,6 @@ sonde_path_def sonde_path_def_default(void) {
                           .max_iterations = 400};
 }
 
-static sonde_status create_equilibria(path *p, sonde_error *error) {
-  equilibrium *all[] = {&p->here, &p->half, &p->whole, &p->end};
-  for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
-    all[k]->position = SONDE_NEW(sonde_vec3, nodes(p));
-    all[k]->touched = SONDE_NEW(uint8_t, nodes(p));
-    if (!all[k]->position || !all[k]->touched) return sonde_fail_memory(error);
-  }
-  return SONDE_OK;
-}
-
 // Exact at the end; says why when that is not where the press was to go.
 static sonde_status conclude(path *p, sonde_error *error) {
   sonde_path_result *r = p->result;
@@ -210,7 +200,12 @@ sonde_status sonde_settle_path(sonde_state *state, const sonde_probe *probe, son
   p.length_m =
       v_distance(from.position, to.position) + angle * hypot(probe->half_x_m, probe->half_y_m);
   sonde_status status = check_def(p.def, error);
-  if (!status) status = create_equilibria(&p, error);
+  equilibrium *const all[] = {&p.here, &p.half, &p.whole, &p.end};
+  for (size_t k = 0; k < SONDE_COUNT_OF(all) && !status; ++k) {
+    all[k]->position = SONDE_NEW(sonde_vec3, nodes(&p));
+    all[k]->touched = SONDE_NEW(uint8_t, nodes(&p));
+    if (!all[k]->position || !all[k]->touched) status = sonde_fail_memory(error);
+  }
   if (!status) {
     sonde_state_publish(state);
     memcpy(p.here.position, state->position, nodes(&p) * sizeof *p.here.position);
@@ -219,7 +214,6 @@ sonde_status sonde_settle_path(sonde_state *state, const sonde_probe *probe, son
   if (!status && p.end.settled.converged && p.end.force_n >= p.def->force_n && p.end.share > 0)
     meet_force(&p);
   if (!status) status = conclude(&p, error);
-  equilibrium *all[] = {&p.here, &p.half, &p.whole, &p.end};
   for (size_t k = 0; k < SONDE_COUNT_OF(all); ++k) {
     sonde_free(all[k]->position);
     sonde_free(all[k]->touched);
