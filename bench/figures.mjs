@@ -214,14 +214,19 @@ const GROUPS = {
   },
   image: {
     sources: ['src/sonde/echo', 'src/sonde/interior'],
+    // The bundled thigh by the plain scanner, then a whole limb by one that ships.
     measure(bin) {
-      const values = {}
+      const values = { limb: {} }, folder = mkdtempSync(join(tmpdir(), 'sonde-figures-')), path = join(folder, 'limb.sonde')
+      run(bin, 'sonde', 'limb', '--seed', '3', '--bmi', '24', '--model', path)
       for (const kernels of ['avx512', 'avx2', 'sse4', 'base']) {
-        const text = run(bin, 'sonde', 'bench', '--scene', 'image', '--frames', '100', '--kernels', kernels, '--json')
-        const r = JSON.parse(text)
-        values[kernels] = { frame_ms: r.frame_ms.median, p99_ms: r.frame_ms.p99, ...r.stages_ms }
-        values.scatterers = r.scatterers
+        const bench = (...options) =>
+          json(bin, 'bench', ...options, '--scene', 'image', '--frames', '100', '--kernels', kernels)
+        const take = r => ({ frame_ms: r.frame_ms.median, p99_ms: r.frame_ms.p99, ...r.stages_ms })
+        const thigh = bench(), limb = bench(path, '--scanner', 'venous')
+        values[kernels] = take(thigh), values.limb[kernels] = take(limb)
+        values.scatterers = thigh.scatterers, values.limb.scatterers = limb.scatterers
       }
+      rmSync(folder, { recursive: true })
       return values
     },
   },
@@ -371,6 +376,11 @@ const fenced = text => '```\n' + text.trimEnd() + '\n```'
 const fixed = (value, decimals) => value.toLocaleString('en-US', { minimumFractionDigits: decimals, maximumFractionDigits: decimals })
 
 // What the blocks of the documents show, from the groups' values; undefined where a group is not measured.
+// Times of pictures by instruction set.
+const frames = image => table(['kernels', 'frame', '99 %', 'plane', 'medium', 'scatterers', 'beam', 'picture'],
+  ['avx512', 'avx2', 'sse4', 'base'].map(name => [name, ...['frame_ms', 'p99_ms'].map(key => fixed(image[name][key], 1)),
+    ...['plane', 'medium', 'scatter', 'beam', 'picture'].map(key => fixed(image[name][key], 2))]))
+
 const BLOCKS = {
   course_search({ course }) {
     const name = { full: 'full', hints: 'names alone', exam: 'none' }
@@ -431,9 +441,8 @@ const BLOCKS = {
   step: ({ step }) => table(['`sonde bench --scene`', 'steps/s', 'median, ms', '99 %, ms', 'most, ms', 'error'],
     Object.entries(step).map(([name, e]) => [`\`${name}\``, fixed(e.steps_per_s.median, 0), fixed(e.median_ms.median, 3),
       fixed(e.p99_ms.median, 2), fixed(e.max_ms.median, 2), `${fixed(e.error_percent, 2)} %`])),
-  frame: ({ image }) => table(['kernels', 'frame', '99 %', 'plane', 'medium', 'scatterers', 'beam', 'picture'],
-    ['avx512', 'avx2', 'sse4', 'base'].map(name => [name, ...['frame_ms', 'p99_ms'].map(key => fixed(image[name][key], 1)),
-      ...['plane', 'medium', 'scatter', 'beam', 'picture'].map(key => fixed(image[name][key], 2))])),
+  frame: ({ image }) => frames(image),
+  frame_limb: ({ image }) => frames(image.limb),
   // The claims of a section of the paper: "2", "3.1", ...
   ...Object.fromEntries(['1', '2', '3.1', '3.2', '4.1', '4.2', '5'].map(section => [`paper_${section.replace('.', '_')}`, ({ paper }) =>
     table(['the paper', 'what came out', ''], Object.values(paper.claims).filter(c => c.section.split(',')[0] === section)

@@ -475,7 +475,7 @@ static void aberration_moves_power(void **state) {
   (void)state;
   enum { COUNT = 512, WHOLE = COUNT + 2 * HAZE_REACH };
   static float in[2][WHOLE], ramp[2][COUNT], out[2][COUNT], kept[COUNT];
-  const halo_taps halo = {{-5, -2, 2, 5}, {0.5f, 0, -0.3f, 0.4f}, {0, 0.5f, 0.4f, 0.3f}};
+  const halo_taps halo = {{-5, -2, 2, 5}};
   look_job job = {.kept = kept, .kept_low = kept, .halo = &halo, .count = COUNT};
   for (int k = 0; k < SONDE_FINE; ++k) {
     job.re[k] = in[0] + HAZE_REACH, job.im[k] = in[1] + HAZE_REACH;

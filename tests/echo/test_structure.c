@@ -1,7 +1,9 @@
 // The texture of fat and muscle: lines along the skin and the fibres, dots across them, carried by
 // the tissue, and no repetition of the tiles in view.
 #include "echo/bench.h"
+#include "base/random.h"
 #include "echo/echo.h"
+#include "echo/gates.h"
 
 // The probe above muscle, across the leg or along it.
 static void aim(bench *b, bool along, double shift_m) {
@@ -98,9 +100,86 @@ static void texture_stays_in_the_tissue(void **state) {
   bench_clear(&b);
 }
 
+// Blocks of lines are let off vessels and muscles that are far from them, and off nothing else: a
+// round vein of 3 mm radius and seven seeds, of which two make one cell, in a plane of 2 mm by 1.6.
+static void gates_let_in_what_matters(void **state) {
+  (void)state;
+  enum { SEEDS = 7, ROWS = 24 };
+  bench b;
+  bench_create(&b, leg_radius, 0.014, 0.006, false, true);
+  look(&b, NULL);
+  sonde_echo *e = b.echo;
+  sonde_gates *g = e->gates;
+  tissue_job job = {.lines = e->padded, .vessels = 1, .cells = SEEDS};
+  job.vessel[0].wall_m = 0.6e-3f, job.vessel[0].sheath_m = 1e-3f;
+  for (int k = 0; k < SEEDS; ++k)
+    job.cell[k] = (tissue_cell){.x_mm = (float)(48 * sonde_random_uniform(11, (uint64_t)k)),
+                                .y_mm = (float)(40 * sonde_random_uniform(12, (uint64_t)k)),
+                                .cell = (float)(k > 1 ? k : 1)};
+  const uint32_t first = map_field_at(1, 0, 1);
+  for (uint32_t node = 0; node < ROWS * SONDE_PLANE_COLUMNS; ++node) {
+    const float x = 2 * (float)(node % SONDE_PLANE_COLUMNS);
+    const float y = 1.6f * (float)(node / SONDE_PLANE_COLUMNS);
+    float *at = e->plane + node, *vein = at + PLANE_LAYERS * SONDE_PLANE_NODES;
+    at[PLANE_DEPTH * SONDE_PLANE_NODES] = 1, at[PLANE_MUSCLE * SONDE_PLANE_NODES] = 0;
+    vein[VESSEL_SHORT * SONDE_PLANE_NODES] = (y - 20) / 3;
+    vein[VESSEL_LONG * SONDE_PLANE_NODES] = (x - 24) / 3;
+    vein[VESSEL_HALF_SHORT * SONDE_PLANE_NODES] = 3e-3f;
+    vein[VESSEL_HALF_LONG * SONDE_PLANE_NODES] = 3e-3f;
+    for (uint32_t k = 0; k < SEEDS; ++k) {
+      const float dx = x - job.cell[k].x_mm, dy = y - job.cell[k].y_mm;
+      at[(first + k) * SONDE_PLANE_NODES] = dx * dx + dy * dy;
+    }
+  }
+  for (uint32_t l = 0; l < e->padded; ++l)
+    g->column[0][l] = g->column[1][l] = (int32_t)(l * 23 / e->padded);
+  uint32_t blocks = 0, veins = 0, alone = 0;
+  e->plane_rows = ROWS;
+  for (uint32_t j = 0; j + 1 < ROWS; ++j) {
+    sonde_gates_find(e, &job, j);
+    for (uint32_t l = 0; l < e->padded; l += ECHO_ALIGN, ++blocks) {
+      const tissue_gate *gate = &g->block[l / ECHO_ALIGN];
+      veins += gate->vessels, alone += gate->cells == 1;
+      for (uint32_t n = 0; n < 5 * 5 * 9; ++n) { // places by winds of both signs
+        const float left = 2 * (float)g->column[0][l];
+        const float right = 2 * (float)g->column[0][l + ECHO_ALIGN - 1] + 2;
+        const float x = left + (right - left) * (float)(n % 5) / 4;
+        const float y = 1.6f * ((float)j + (float)(n / 5 % 5) / 4);
+        const float wx = 0.7f * (float)((int)(n / 25 % 3) - 1),
+                    wy = 0.7f * (float)((int)(n / 75) - 1);
+        if (!gate->vessels) assert_true(hypotf(x - 24, y - 20) > 3 + 1.6f);
+        float power[SEEDS];
+        uint32_t own = 0, next = SEEDS;
+        for (uint32_t k = 0; k < SEEDS; ++k) {
+          const tissue_cell *c = &job.cell[k];
+          power[k] =
+              powf(x - c->x_mm, 2) + powf(y - c->y_mm, 2) - 2 * (wx * c->x_mm + wy * c->y_mm);
+          if (power[k] < power[own]) own = k;
+        }
+        for (uint32_t k = 0; k < SEEDS; ++k)
+          if (job.cell[k].cell != job.cell[own].cell && (next == SEEDS || power[k] < power[next]))
+            next = k;
+        assert_non_null(memchr(gate->cell, (int)own, gate->cells));
+        const float apart = hypotf(job.cell[own].x_mm - job.cell[next].x_mm,
+                                   job.cell[own].y_mm - job.cell[next].y_mm);
+        if (gate->cells == 1)
+          assert_true(power[next] - power[own] > 2.1f * apart);
+        else
+          assert_non_null(memchr(gate->cell, (int)next, gate->cells));
+      }
+    }
+  }
+  print_message("of %u blocks %u see the vein, %u one cell\n", blocks, veins, alone);
+  assert_true(veins < blocks / 3 && alone > blocks / 10);
+  bench_clear(&b);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(muscle_has_stripes_along_and_dots_across),
-                                     cmocka_unit_test(tiles_do_not_repeat_in_view),
-                                     cmocka_unit_test(texture_stays_in_the_tissue)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(muscle_has_stripes_along_and_dots_across),
+      cmocka_unit_test(tiles_do_not_repeat_in_view),
+      cmocka_unit_test(texture_stays_in_the_tissue),
+      cmocka_unit_test(gates_let_in_what_matters),
+  };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

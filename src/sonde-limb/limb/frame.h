@@ -66,6 +66,17 @@ double limb_skin_radius(const sonde_limb *limb, double level, double angle);
 // Distance of the superficial (saphenous) fascia outside the deep fascia along the ray, m: the deep
 // layer of fat, in which the saphenous veins run. 0 < value < limb_fat.
 double limb_deep_fat(const sonde_limb *limb, double level, double angle);
+// The same of a whole thickness.
+static inline double limb_deep_share(double fat_m) {
+  return least_of(0.45 * fat_m, 0.003 + 0.2 * fat_m);
+}
+// Radii of the fascia and the skin and the fat between them, and the skin's a step of the level up
+// and down and a step of the angle back and on.
+typedef struct limb_radii {
+  double fascia, fat, skin, up, down, back, on;
+} limb_radii;
+limb_radii limb_radii_at(const sonde_limb *limb, double level, double angle, double rise,
+                         double turn);
 
 // Polar to space and back.
 void limb_point(const sonde_limb *limb, double level, double angle, double f, double xyz[3]);

@@ -134,19 +134,15 @@ limb_layers limb_layers_at(const sonde_limb *limb, sonde_vec3 p) {
   // The distance along the ray over the slope of the surface around and along the limb is the one
   // along the normal.
   const double turn = 0.02, rise = 0.006;
-  double fascia = limb_fascia_radius(limb, level, a), skin = limb_skin_radius(limb, level, a);
-  double around =
-      (limb_skin_radius(limb, level, a + turn) - limb_skin_radius(limb, level, a - turn)) /
-      (2 * turn * skin);
+  const limb_radii at = limb_radii_at(limb, level, a, rise, turn);
+  double around = (at.on - at.back) / (2 * turn * at.skin);
   sonde_vec3 up = limb_centre(limb, level - rise), down = limb_centre(limb, level + rise);
   double along =
-      (limb_skin_radius(limb, level - rise, a) - limb_skin_radius(limb, level + rise, a) +
-       (up.x - down.x) * sin(a) + (up.y - down.y) * cos(a)) /
-      (up.z - down.z);
+      (at.up - at.down + (up.x - down.x) * sin(a) + (up.y - down.y) * cos(a)) / (up.z - down.z);
   double slope = sqrt(1 + around * around + along * along), beyond = most_of(p.z - top, foot - p.z);
-  double deep = fascia + limb_deep_fat(limb, level, a);
-  return (limb_layers){most_of((r - skin) / slope, beyond), most_of((r - deep) / slope, beyond),
-                       most_of((r - fascia) / slope, beyond)};
+  double deep = at.fascia + limb_deep_share(at.fat);
+  return (limb_layers){most_of((r - at.skin) / slope, beyond), most_of((r - deep) / slope, beyond),
+                       most_of((r - at.fascia) / slope, beyond)};
 }
 
 sonde_limb_distances sonde_limb_distance(const sonde_limb *limb, sonde_vec3 point) {

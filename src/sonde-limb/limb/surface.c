@@ -78,9 +78,29 @@ double limb_skin_radius(const sonde_limb *limb, double level, double angle) {
   return lookup(limb->surface.fascia, &p) + lookup(limb->surface.fat, &p) + limb->body.skin_m;
 }
 
+limb_radii limb_radii_at(const sonde_limb *limb, double level, double angle, double rise,
+                         double turn) {
+  const limb_surface *s = &limb->surface;
+  SONDE_ASSERT(rise > 0 && turn > 0);
+  place here, up, down;
+  place_level(level, &here), place_level(level - rise, &up), place_level(level + rise, &down);
+  place left = here, right = here;
+  place_angle(angle, &here), place_angle(angle - turn, &left), place_angle(angle + turn, &right);
+  memcpy(up.column, here.column, sizeof up.column),
+      memcpy(up.around, here.around, sizeof up.around);
+  memcpy(down.column, here.column, sizeof down.column);
+  memcpy(down.around, here.around, sizeof down.around);
+  const double fascia = lookup(s->fascia, &here), fat = lookup(s->fat, &here);
+  const place *const beside[4] = {&up, &down, &left, &right};
+  double skin[4];
+  for (int k = 0; k < 4; ++k)
+    skin[k] = lookup(s->fascia, beside[k]) + lookup(s->fat, beside[k]) + limb->body.skin_m;
+  return (limb_radii){fascia,  fat,    fascia + fat + limb->body.skin_m, skin[0], skin[1],
+                      skin[2], skin[3]};
+}
+
 double limb_deep_fat(const sonde_limb *limb, double level, double angle) {
-  double whole = limb_fat(limb, level, angle);
-  return least_of(0.45 * whole, 0.003 + 0.2 * whole);
+  return limb_deep_share(limb_fat(limb, level, angle));
 }
 
 void limb_point(const sonde_limb *limb, double level, double angle, double f, double xyz[3]) {

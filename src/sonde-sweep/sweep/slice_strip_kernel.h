@@ -74,7 +74,7 @@ INLINE void locate_row(const sonde_slicer *s, const strip_table *table, bool che
     floats x = vload(lanes + k), value[SLICE_FORMS];
     ints index = find_index(table, x, row);
     for (int f = 0; f < SLICE_FORMS; ++f)
-      value[f] = (floats)look_up(starts[f], index) + x * (floats)vlook_up(table->column[f], index);
+      value[f] = (floats)look_up(starts[f], index) + x * (floats)look_up(table->column[f], index);
     if (checked) {
       ints met = check(s, table, value);
       memcpy(w->met + first + k, &met, sizeof met);

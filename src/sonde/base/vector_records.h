@@ -27,8 +27,6 @@ INLINE void vtranspose_float_x4(const float_x4 row[4], float_x4 column[4]) {
 }
 #endif
 
-// ---- points ---------------------------------------------------------------------------------
-
 INLINE float_x4 point_of(sonde_vec3 a) { return (float_x4){(float)a.x, (float)a.y, (float)a.z, 0}; }
 // Columns m[0], m[1], m[2] times (x, y, z).
 INLINE float_x4 transform_point(const float_x4 m[3], float_x4 a) {
@@ -72,8 +70,6 @@ TRANSPOSE(float_x16, __m512, _mm512)
 #define vtranspose vtranspose_float_x4
 #endif
 
-// ---- lanes ----------------------------------------------------------------------------------
-
 // base[index].
 INLINE floats vgather(const float *base, ints index) {
 #if defined(__AVX512F__)
@@ -91,6 +87,9 @@ INLINE floats vlook_up(const float *base, ints index) {
   return (floats)_mm512_permutexvar_ps((__m512i)index, (__m512)vload(base));
 #elif defined(__AVX2__)
   return (floats)_mm256_permutevar8x32_ps((__m256)vload(base), (__m256i)index);
+#elif defined(__SSE4_2__)
+  index = index * 0x04040404 + 0x03020100; // their bytes
+  return (floats)_mm_shuffle_epi8((__m128i)vload(base), (__m128i)index);
 #else
   return vgather(base, index);
 #endif

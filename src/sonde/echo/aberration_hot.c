@@ -2,7 +2,6 @@
 // places beside it. Straight ways through the slowness that the march has found lead from the
 // aperture to a depth of each line.
 #include "base/base.h"
-#include "base/random.h"
 #include "echo/sound.h"
 
 #include <string.h>
@@ -69,9 +68,7 @@ void sonde_aberration_find(sonde_echo *echo) {
     for (uint32_t l = first + echo->lines; l < columns; ++l) kept[l] = kept[l - 1];
   }
   for (int t = 0; t < HALO_TAPS; ++t) {
-    const double angle = 2 * SONDE_PI * sonde_random_uniform(5, (uint64_t)t);
-    const double size = 1 / sqrt(HALO_TAPS), lines = (double)halo_m[t] / f->pitch_m;
+    const double lines = (double)halo_m[t] / f->pitch_m;
     s->halo.offset[t] = (int32_t)clamp(rint(lines), -HAZE_REACH, HAZE_REACH);
-    s->halo.re[t] = (float)(size * cos(angle)), s->halo.im[t] = (float)(size * sin(angle));
   }
 }

@@ -60,10 +60,9 @@ void sonde_looks_begin(sonde_echo *echo) {
   const double size = pow(10, s->haze_db / 20) / sqrt(HAZE_TAPS);
   for (int t = 0; t < HAZE_TAPS; ++t) {
     const double across = 3e-3 * (2.0 * t / (HAZE_TAPS - 1) - 1) / f->pitch_m;
-    const double angle = 2 * SONDE_PI * sonde_random_uniform(4, (uint64_t)t);
     echo->haze.offset[t] = (int32_t)clamp(rint(across), -HAZE_REACH, HAZE_REACH);
-    echo->haze.re[t] = (float)(size * cos(angle)), echo->haze.im[t] = (float)(size * sin(angle));
   }
+  echo->haze.size = (float)size;
 }
 
 void sonde_echo_ghosts(sonde_echo *echo) {

@@ -5,6 +5,7 @@
 #include "echo/cubes.h"
 #include "echo/echo.h"
 #include "echo/bands.h"
+#include "echo/gates.h"
 #include "echo/sound.h"
 #include "interior/fields.h"
 
@@ -75,8 +76,7 @@ static size_t carve_pool(scatter_pool *pool, char *block, size_t used, size_t co
 static size_t carve(sonde_echo *echo, char *block) {
   size_t lines = echo->padded, image = lines * echo->samples, used = 0,
          most_lines = SONDE_FINE * lines + 2 * SONDE_MOST_TAPS + 4 * ECHO_ALIGN;
-  CARVE(echo->wide, 2 * lines * MOST_FIELDS);
-  CARVE(echo->row, lines * MOST_FIELDS);
+  for (int k = 0; k < 2; ++k) CARVE(echo->wide[k], lines * MOST_FIELDS);
   CARVE(echo->level[0], lines * MOST_LEVELS);
   CARVE(echo->level[1], lines * MOST_LEVELS);
   for (int k = 0; k < 3; ++k) CARVE(echo->septum[k], lines);
@@ -126,6 +126,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->bands, 1);
   CARVE(echo->motion, 1);
   CARVE(echo->sound, 1);
+  CARVE(echo->gates, 1);
   used = carve_pool(&echo->pool, block, used, 2 * SONDE_POOL + SONDE_LOOSE);
   return carve_pool(&echo->blood, block, used, SONDE_BLOOD);
 }

@@ -126,10 +126,9 @@ struct sonde_echo {
   struct sonde_fields *motion; // of this frame
 
   // The march along the lines (medium_hot.c).
-  int32_t line_column[SONDE_MOST_LINES]; // coarse column left of each line
-  float line_share[SONDE_MOST_LINES];    // distance to the next, columns
-  float *wide;                           // [2][fields][padded] two coarse rows, per line
-  float *row;                            // [fields][padded], one row of the march
+  struct sonde_gates *gates; // gates.h
+  float *wide[2];            // [fields][padded] two coarse rows, per line
+  float wide_share;          // of the way from one to the other, of this row of the march
   float *septum[3]; // [padded] distance to the fat's septa of this row and the last, their strength
   float wall_m[MOST_VESSELS];    // of those shown
   float *level[2];               // [levels][padded] of this row and the last

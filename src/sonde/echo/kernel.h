@@ -177,9 +177,11 @@ typedef struct widen_job {
 
 // Rows of the fields of plane.h at one depth, in; tissue out.
 typedef struct tissue_job {
-  const float *row;                   // [fields][lines]
-  uint32_t lines;                     // multiple of ECHO_ALIGN
-  uint32_t vessels, lesions;          // in view; the first two are the femoral vein and artery
+  const float *top, *low;    // [fields][lines] at the coarse rows above and below, where gates let
+  float share;               // of the way from top to low
+  const tissue_gate *gate;   // [lines / ECHO_ALIGN]
+  uint32_t lines;            // multiple of ECHO_ALIGN
+  uint32_t vessels, lesions; // in view; the first two are the femoral vein and artery
   tissue_vessel vessel[MOST_VESSELS]; // branches after their parents
   tissue_lesion lesion[MOST_LESIONS];
   uint32_t cells; // 0: the layers alone
@@ -203,7 +205,8 @@ typedef struct tissue_job {
   // [lines] signed distance to the nearest of the fat's coherent septa, which jumps half-way
   // between two, and their strength there
   float *septum, *septum_size;
-  uint8_t *crossed; // [lines / ECHO_ALIGN] whether any sign of these lines changed
+  const float *septum_before; // the distance in the row above
+  uint16_t *crossed, *parted; // [lines / ECHO_ALIGN] a bit per line: a level, a septum is crossed
 } tissue_job;
 
 // Gain of a row of the march: what scatters there and is left behind the losses, and clutter.
@@ -227,8 +230,6 @@ typedef struct echo_kernels {
   void (*tissue)(const tissue_job *job);
   void (*merge)(const merge_job *job);
   void (*widen)(const widen_job *job);
-  // out = top + share (low - top); count is a multiple of ECHO_ALIGN
-  void (*mix)(const float *top, const float *low, float share, float *out, uint32_t count);
   void (*fade)(const fade_job *job);
   void (*convert)(const convert_job *job);
   void (*look)(const look_job *job);

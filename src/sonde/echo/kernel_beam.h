@@ -55,6 +55,15 @@ static void merge(const merge_job *job) {
   }
 }
 
+// Adds a column after some quarter turns.
+INLINE void add_turned(const float *re, const float *im, int turns, floats *x, floats *y) {
+  const floats a = vload(re), b = vload(im);
+  if (turns == 0) *x = *x + a, *y = *y + b;
+  if (turns == 1) *x = *x - b, *y = *y + a;
+  if (turns == 2) *x = *x - a, *y = *y - b;
+  if (turns == 3) *x = *x + b, *y = *y - a;
+}
+
 // A merged row of a look: aberration spreads it, side lobes join, and every column turns by the
 // look's phase.
 static void look(const look_job *job) {
@@ -67,20 +76,18 @@ static void look(const look_job *job) {
         const floats top = vload(job->kept + l);
         const floats kept = top + job->share * (vload(job->kept_low + l) - top);
         const floats lost = vsqrt(vmax(1 - kept * kept, vset(0)));
+        const int32_t *at = job->halo->offset;
         floats u = vset(0), v = vset(0);
-        for (int t = 0; t < HALO_TAPS; ++t) {
-          const int32_t at = job->halo->offset[t];
-          floats a = vload(re + at), b = vload(im + at);
-          u = u + job->halo->re[t] * a - job->halo->im[t] * b;
-          v = v + job->halo->re[t] * b + job->halo->im[t] * a;
-        }
-        x = kept * x + lost * u, y = kept * y + lost * v;
+        UNROLL for (int t = 0; t < HALO_TAPS; ++t)
+            add_turned(re + at[t], im + at[t], halo_turns[t], &u, &v);
+        x = kept * x + halo_size * lost * u, y = kept * y + halo_size * lost * v;
       }
-      for (int t = 0; job->haze && t < HAZE_TAPS; ++t) {
-        const int32_t at = job->haze->offset[t];
-        floats a = vload(re + at), b = vload(im + at);
-        x = x + job->haze->re[t] * a - job->haze->im[t] * b;
-        y = y + job->haze->re[t] * b + job->haze->im[t] * a;
+      if (job->haze) {
+        const int32_t *at = job->haze->offset;
+        floats u = vset(0), v = vset(0);
+        UNROLL for (int t = 0; t < HAZE_TAPS; ++t)
+            add_turned(re + at[t], im + at[t], haze_turns[t], &u, &v);
+        x = x + job->haze->size * u, y = y + job->haze->size * v;
       }
       floats c = vload(job->ramp_re[part] + l), s = vload(job->ramp_im[part] + l);
       vstore(job->out_re[part] + l, x * c - y * s), vstore(job->out_im[part] + l, y * c + x * s);

@@ -22,11 +22,17 @@ INLINE void mark_both(ints mask, floats scatter, floats loss, floats out[2]) {
 // What a point's texture depends on.
 typedef struct tissue_point {
   knots *memory;
-  const float *map; // fields of the tissue map
+  const tissue_gate *gate;
+  uint32_t map; // place of the tissue map's fields
   floats theta, s, depth;
   floats facing; // how squarely the beam meets the layers, 0..1
   floats sheath; // of the bright fat around a vessel, 0..1
 } tissue_point;
+
+// Place of a body's fields behind the map's.
+INLINE uint32_t body_place_at(const tissue_job *job, uint32_t map, uint32_t body) {
+  return map + (1 + job->cells + BODY_FIELDS * body) * job->lines;
+}
 
 // Signed distance to the ellipsoid |q| = 1, m, to first order.
 INLINE floats lesion_distance(const tissue_lesion *lesion, const floats q[3]) {
@@ -72,12 +78,12 @@ static const float tendon_body = 0.35f, tendon_bright = 2.2f, fibril_per_m = 260
 static const float body_loss[2] = {90, 110}, node_rim = 0.35f;
 
 // Nerves, tendons and nodes of the tissue map.
-INLINE void bodies(const tissue_job *job, const tissue_point *p, const float *field,
-                   floats out[2]) {
+INLINE void bodies(const tissue_job *job, const tissue_point *p, floats out[2]) {
   const uint32_t n = job->lines;
-  for (uint32_t k = 0; k < job->bodies; ++k, field += BODY_FIELDS * n) {
+  for (uint32_t i = 0; i < p->gate->bodies; ++i) {
+    const uint32_t k = p->gate->body[i], field = body_place_at(job, p->map, k);
     const tissue_body *it = &job->body[k];
-    floats q[3] = {vload(field), vload(field + n), vload(field + 2 * n)};
+    floats q[3] = {field_at(job, field), field_at(job, field + n), field_at(job, field + 2 * n)};
     if (it->kind == SONDE_TISSUE_NODE) {
       const tissue_lesion node = {
           TISSUE_NODE, {1 / it->half_m[0], 1 / it->half_m[1], 1 / it->half_m[2]}, node_rim};

@@ -14,18 +14,21 @@ enum {
   AXIAL_MOST = 4, // samples summed at once
 };
 
-// Side lobes: what neighbours send into a column, a fixed pattern.
+// Side lobes: what neighbours send into a column, a fixed pattern of equal power. Its phases are
+// quarter turns, which need no multiplication, in no order.
 enum { HAZE_TAPS = 7, HAZE_REACH = 16 }; // lines
+static const int haze_turns[HAZE_TAPS] = {1, 0, 3, 2, 0, 1, 2};
 typedef struct haze_taps {
   int32_t offset[HAZE_TAPS]; // lines
-  float re[HAZE_TAPS], im[HAZE_TAPS];
+  float size;                // amplitude of each
 } haze_taps;
 
 // Columns whose echo aberration sends into a column, in place of what the column's own loses.
 enum { HALO_TAPS = 4 };
+static const int halo_turns[HALO_TAPS] = {0, 3, 2, 0};
+static const float halo_size = 0.5f; // all of the lost power
 typedef struct halo_taps {
   int32_t offset[HALO_TAPS]; // lines
-  float re[HALO_TAPS], im[HALO_TAPS];
 } halo_taps;
 
 // A merged row with its side lobes, times a phase per column.

@@ -23,19 +23,21 @@ static const float winding_mm = 0.7f;
 // A point lies in the cell whose seed has the least power there. The boundary with the cell of the
 // next power is half the difference of both powers over the distance of both seeds away. A step d
 // of the point adds -2 d.c to the power of a seed at c, apart from what it adds to all.
-INLINE muscle_place place_in_muscles(const tissue_job *job, knots *memory, const float *field,
-                                     floats theta, floats s, floats depth) {
+INLINE muscle_place place_in_muscles(const tissue_job *job, const tissue_gate *gate, knots *memory,
+                                     uint32_t field, floats theta, floats s, floats depth) {
   const uint32_t n = job->lines;
+  muscle_place at = {vset_ints(gate->cell[0]), vset(0)};
+  if (gate->cells == 1) return at; // no other one can be as near as its boundary is thick
   floats least = vset(1e30f), next = vset(1e30f), cell = vset(-1);
   floats x = vset(0), y = vset(0), next_x = vset(0), next_y = vset(0);
   floats section = vset(0), next_section = vset(0);
   floats wind_x = texture(memory, theta, s * 120, depth * 220, TURNS_FAT, 2);
   floats wind_y = texture(memory, theta, s * 140, depth * 250, TURNS_FAT, 3);
   wind_x = wind_x * (-2 * winding_mm), wind_y = wind_y * (-2 * winding_mm);
-  muscle_place at = {vset_ints(0), vset(0)};
-  for (uint32_t k = 0; k < job->cells; ++k) {
+  for (uint32_t i = 0; i < gate->cells; ++i) {
+    const uint32_t k = gate->cell[i];
     const tissue_cell *c = &job->cell[k];
-    const floats power = vload(field + k * n) + (wind_x * c->x_mm + wind_y * c->y_mm);
+    const floats power = field_at(job, field + k * n) + (wind_x * c->x_mm + wind_y * c->y_mm);
     const ints own = cell == c->cell, first = power < least;
     // When this seed has the least power so far, the cell that had it before becomes the next one.
     const ints pushed = first & ~own, second = ~first & ~own & (power < next);

@@ -81,7 +81,8 @@ INLINE void mix_samples(const convert_job *job, float *mixed) {
   uint32_t n = (uint32_t)sample < job->samples - 2 ? (uint32_t)sample : job->samples - 2;
   const float *top = job->grey + (size_t)n * job->stride, *low = top + job->stride;
   if (!job->cubic) {
-    mix(top, low, sample - (float)n, mixed, job->stride);
+    for (uint32_t l = 0; l < job->stride; l += FLOATS)
+      vstore(mixed + l, vload(top + l) + (sample - (float)n) * (vload(low + l) - vload(top + l)));
     vstore(mixed + job->stride, vset(0)); // read beside the last line, not used
     return;
   }

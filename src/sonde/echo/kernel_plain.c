@@ -177,10 +177,6 @@ static void widen(const widen_job *job) {
   }
 }
 
-static void mix(const float *top, const float *low, float share, float *out, uint32_t count) {
-  for (uint32_t i = 0; i < count; ++i) out[i] = top[i] + share * (low[i] - top[i]);
-}
-
 static void fade(const fade_job *job) {
   for (uint32_t l = 0; l < job->lines; ++l) {
     double left = pow(10, -fmin((double)job->loss_db[l], 600) / 20);
@@ -189,6 +185,12 @@ static void fade(const fade_job *job) {
     job->gain[l] = (float)sqrt(power + facets * facets + (double)job->clutter * tail);
     job->tail[l] = (float)((double)job->kept * (tail + (double)job->fresh * (power - tail)));
   }
+}
+
+// Adds a column after some quarter turns.
+static void add_turned(double re, double im, int turns, double *x, double *y) {
+  const double c = cos(turns * 0.5 * SONDE_PI), s = sin(turns * 0.5 * SONDE_PI);
+  *x += re * c - im * s, *y += re * s + im * c;
 }
 
 static void look(const look_job *job) {
@@ -201,17 +203,15 @@ static void look(const look_job *job) {
       double a = 0, b = 0;
       for (int t = 0; t < HALO_TAPS; ++t) {
         const int64_t at = (int64_t)l + job->halo->offset[t];
-        const double u = (double)job->halo->re[t], v = (double)job->halo->im[t];
-        const double x = (double)job->re[part][at], y = (double)job->im[part][at];
-        a += u * x - v * y, b += u * y + v * x;
+        add_turned((double)job->re[part][at], (double)job->im[part][at], halo_turns[t], &a, &b);
       }
-      re = kept * re + lost * a, im = kept * im + lost * b;
+      re = kept * re + (double)halo_size * lost * a, im = kept * im + (double)halo_size * lost * b;
     }
     for (int t = 0; job->haze && t < HAZE_TAPS; ++t) {
-      const float *x = job->re[part] + (int64_t)l + job->haze->offset[t],
-                  *y = job->im[part] + (int64_t)l + job->haze->offset[t];
-      const double u = (double)job->haze->re[t], v = (double)job->haze->im[t];
-      re += u * (double)*x - v * (double)*y, im += u * (double)*y + v * (double)*x;
+      const int64_t at = (int64_t)l + job->haze->offset[t];
+      const double size = (double)job->haze->size;
+      add_turned(size * (double)job->re[part][at], size * (double)job->im[part][at], haze_turns[t],
+                 &re, &im);
     }
     const double c = (double)job->ramp_re[part][l], s = (double)job->ramp_im[part][l];
     job->out_re[part][l] = (float)(re * c - im * s);
@@ -312,5 +312,5 @@ static void convert(const convert_job *job) {
 }
 
 const echo_kernels sonde_echo_kernels_plain = {
-    "plain", splat, warp, smooth,  stream, lateral,  axial,        tissue, merge,
-    widen,   mix,   fade, convert, look,   compress, smooth_lines, show};
+    "plain", splat, warp, smooth,  stream, lateral,  axial,        tissue,
+    merge,   widen, fade, convert, look,   compress, smooth_lines, show};

@@ -9,14 +9,6 @@
 
 #include <string.h>
 
-static void mix(const float *top, const float *low, float share, float *out, uint32_t count) {
-  SONDE_ASSERT(count % ECHO_ALIGN == 0);
-  for (uint32_t i = 0; i < count; i += FLOATS) {
-    floats a = vload(top + i);
-    vstore(out + i, a + share * (vload(low + i) - a));
-  }
-}
-
 static void widen(const widen_job *job) {
   SONDE_ASSERT(job->lines % ECHO_ALIGN == 0);
   for (uint32_t l = 0; l < job->lines; l += FLOATS) {

@@ -4,6 +4,7 @@
 #define SONDE_SRC_ECHO_KERNEL_TEXTURE_H
 
 #include "base/vector_records.h"
+#include "echo/kernel.h"
 
 enum { TURNS_MUSCLE = 90, TURNS_FAT = 60 }; // noise cells around the leg
 
@@ -23,6 +24,12 @@ INLINE floats power2(floats a) {
   floats p = 0.0558632826591662f + t * (0.00894621466647436f + t * 0.0018951072909317184f);
   p = 0.9999998957631335f + t * (0.693154620003299f + t * (0.24014077009185858f + t * p));
   return (floats)((ints)p + (vint(i) << 23));
+}
+
+// A field of the plane between two coarse rows.
+INLINE floats field_at(const tissue_job *job, uint32_t at) {
+  const floats top = vload(job->top + at);
+  return top + job->share * (vload(job->low + at) - top);
 }
 
 typedef uint32_t uints __attribute__((vector_size(VECTOR_BYTES)));

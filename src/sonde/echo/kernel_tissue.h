@@ -40,7 +40,7 @@ INLINE void layers(const tissue_job *job, const tissue_point *p, const floats *l
     floats square = p->facing * p->facing, gain = vset(muscle_tissue[0]);
     if (mapped) {
       muscle_place at =
-          place_in_muscles(job, p->memory, p->map + job->lines, p->theta, p->s, p->depth);
+          place_in_muscles(job, p->gate, p->memory, p->map + job->lines, p->theta, p->s, p->depth);
       const bool one = vall(at.which == at.which[0]);
       g = muscle_grain(job, at.which, one, p->theta, p->s, p->depth);
       gain = gain * cell_fact_at(job, CELL_GAIN, at.which, one);
@@ -71,7 +71,7 @@ INLINE void layers(const tissue_job *job, const tissue_point *p, const floats *l
     fat_loss += fluid * (fluid_tissue[1] - fat_loss);
   }
   if (mapped) {
-    floats thin = vmax(1 - vabs(vload(p->map)) * (1 / superficial_m), vset(0));
+    floats thin = vmax(1 - vabs(field_at(job, p->map)) * (1 / superficial_m), vset(0));
     fat_scatter += superficial_scatter * thin;
   }
   ints sheath = (level[1] >= 0) & (vabs(level[2] - 0.3e-3f) < 0.7e-3f);
@@ -98,20 +98,26 @@ INLINE floats periosteum(const tissue_job *job, floats inside, floats before) {
   return vonly(near, (job->rough_bone * size + skin) * (1 - away / job->rough_m));
 }
 
-// Returns the lanes in which a level changed sign since the row above.
-INLINE ints paint(const tissue_job *job, uint32_t l) {
-  const float *f = job->row + l;
+// Lanes in which a level changed sign since the row above, or the distance to the nearest septum.
+typedef struct sign_changes {
+  ints level, septum;
+} sign_changes;
+
+INLINE sign_changes paint(const tissue_job *job, const tissue_gate *gate, uint32_t l) {
   const uint32_t n = job->lines, levels = LAYER_LEVELS + job->vessels + job->lesions;
-  floats depth = vload(f + PLANE_DEPTH * n), fat = vload(f + PLANE_FAT * n);
-  floats muscle = vload(f + PLANE_MUSCLE * n);
-  floats across = vload(f + PLANE_ACROSS * n), up = vload(f + PLANE_UP * n);
-  floats theta = vload(f + PLANE_THETA * n), s = vload(f + PLANE_S * n), level[MOST_LEVELS];
+  floats depth = field_at(job, l + PLANE_DEPTH * n), fat = field_at(job, l + PLANE_FAT * n);
+  floats muscle = field_at(job, l + PLANE_MUSCLE * n);
+  floats across = field_at(job, l + PLANE_ACROSS * n), up = field_at(job, l + PLANE_UP * n);
+  floats theta = field_at(job, l + PLANE_THETA * n), s = field_at(job, l + PLANE_S * n);
+  floats level[MOST_LEVELS];
   level[0] = depth, level[1] = depth - fat, level[2] = depth - muscle;
-  level[3] = vload(f + PLANE_BONE * n) + (job->bone_radius_m - vsqrt(across * across + up * up));
-  const float *map = f + map_field_at(job->vessels, job->lesions, 0) * n;
-  level[4] = job->cells > 0 ? vload(map) : vset(-1);
+  level[3] =
+      field_at(job, l + PLANE_BONE * n) + (job->bone_radius_m - vsqrt(across * across + up * up));
+  const uint32_t map = l + map_field_at(job->vessels, job->lesions, 0) * n;
+  level[4] = job->cells > 0 ? field_at(job, map) : vset(-1);
   floats *wall = level + LAYER_LEVELS, *edge = wall + job->vessels;
   tissue_point point = {(knots *)(void *)(job->memory + (size_t)l * KNOT_FLOATS * TEXTURES),
+                        gate,
                         map,
                         theta,
                         s,
@@ -121,9 +127,12 @@ INLINE ints paint(const tissue_job *job, uint32_t l) {
   // Depth grows along a line with the cosine between line and normal.
   if (job->rows_per_m > 0)
     point.facing = vmin(vabs(depth - vload(job->before + l)) * job->rows_per_m, vset(1));
-  for (uint32_t v = 0; v < job->vessels; ++v) {
-    const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n, *half = at + VESSEL_HALF_SHORT * n;
-    wall[v] = wall_distance(vload(at), vload(at + n), vload(half), vload(half + n));
+  for (uint32_t v = 0; v < job->vessels; ++v) wall[v] = vset(1);
+  for (uint32_t i = 0; i < gate->vessels; ++i) {
+    const uint32_t v = gate->vessel[i], at = l + vessel_field_at(v, VESSEL_SHORT) * n;
+    wall[v] = wall_distance(field_at(job, at), field_at(job, at + VESSEL_LONG * n),
+                            field_at(job, at + VESSEL_HALF_SHORT * n),
+                            field_at(job, at + VESSEL_HALF_LONG * n));
     if (job->vessel[v].sheath_m > 0) {
       floats share = (job->vessel[v].wall_m + job->vessel[v].sheath_m - wall[v]) * 1000;
       point.sheath = vmax(point.sheath, vmin(share, vset(1)));
@@ -131,40 +140,46 @@ INLINE ints paint(const tissue_job *job, uint32_t l) {
   }
   floats tissue[2] = {vset(skin_tissue[0]), vset(skin_tissue[1])};
   septum lobule = {vset(1), vset(0)};
-  layers(job, &point, level, &lobule, tissue);
+  const bool shown = vany((level[0] >= 0) & (level[3] <= 0)); // neither air nor bone
+  if (shown) layers(job, &point, level, &lobule, tissue);
   vstore(job->septum + l, lobule.away), vstore(job->septum_size + l, lobule.size);
-  bodies(job, &point, map + (1 + job->cells) * n, tissue);
+  if (shown) bodies(job, &point, tissue);
   for (uint32_t k = 0; k < job->lesions; ++k) {
-    const float *at = f + lesion_field_at(job->vessels, k, 0) * n;
-    floats q[3] = {vload(at), vload(at + n), vload(at + 2 * n)};
+    const uint32_t at = l + lesion_field_at(job->vessels, k, 0) * n;
+    floats q[3] = {field_at(job, at), field_at(job, at + n), field_at(job, at + 2 * n)};
     edge[k] = lesion_distance(&job->lesion[k], q);
     lesion(&job->lesion[k], point.memory, q, edge[k], theta, s, depth, tissue);
   }
-  vessels(job, point.memory, f, map + (1 + job->cells) * n, wall,
-          job->before + LAYER_LEVELS * n + l, tissue);
+  if (shown) vessels(job, &point, l, wall, tissue);
   mark(level[3] > 0, vset(bone_tissue[0]), bone_tissue[1], tissue);
   mark(level[0] < 0, vset(0), outside_loss, tissue);
   vstore(job->scatter + l, tissue[0]), vstore(job->loss + l, tissue[1]);
   vstore(job->rough + l, periosteum(job, level[3], vload(job->before + 3 * n + l)));
   ints changed = vset_ints(0);
+  ints parted = (lobule.size > 0) & ((lobule.away < 0) ^ (vload(job->septum_before + l) < 0));
   for (uint32_t k = 0; k < levels; ++k) {
     floats last = vload(job->before + k * n + l);
     changed |= (level[k] < 0) ^ (last < 0);
     if (k == 2) changed |= (level[k] > 0) & (last < 2 * fascia_sheet_m[FASCIA_SHEETS - 1]);
     vstore(job->level + k * n + l, level[k]);
   }
-  for (uint32_t v = 0; v < job->vessels; ++v) {
+  for (uint32_t i = 0; i < gate->vessels; ++i) {
+    const uint32_t v = gate->vessel[i];
     const float thick = job->vessel[v].wall_m;
     changed |= (wall[v] < thick) ^ (vload(job->before + (LAYER_LEVELS + v) * n + l) < thick);
   }
-  return changed;
+  return (sign_changes){changed, parted};
 }
 
 static void tissue(const tissue_job *job) {
   for (uint32_t l = 0; l < job->lines; l += ECHO_ALIGN) {
-    bool crossed = false;
-    for (uint32_t k = 0; k < ECHO_ALIGN; k += FLOATS) crossed = vany(paint(job, l + k)) || crossed;
-    job->crossed[l / ECHO_ALIGN] = crossed;
+    const uint32_t block = l / ECHO_ALIGN;
+    uint32_t crossed = 0, parted = 0;
+    for (uint32_t k = 0; k < ECHO_ALIGN; k += FLOATS) {
+      const sign_changes at = paint(job, &job->gate[block], l + k);
+      crossed |= (uint32_t)vbits(at.level) << k, parted |= (uint32_t)vbits(at.septum) << k;
+    }
+    job->crossed[block] = (uint16_t)crossed, job->parted[block] = (uint16_t)parted;
   }
 }
 

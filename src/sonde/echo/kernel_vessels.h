@@ -49,8 +49,9 @@ INLINE floats clot_grain(const tissue_vessel *it, knots *memory, floats theta, f
 // end.
 static const float cusp_m = 0.22e-3f, cusp_scatter = 1.3f, cusp_bend = 0.5f;
 
-INLINE floats cusps(const tissue_body *it, const float *field, uint32_t n) {
-  floats a = vload(field), b = vload(field + n), u = vload(field + 2 * n);
+INLINE floats cusps(const tissue_job *job, const tissue_body *it, uint32_t field) {
+  const uint32_t n = job->lines;
+  floats a = field_at(job, field), b = field_at(job, field + n), u = field_at(job, field + 2 * n);
   floats chord = vsqrt(vmax(1 - b * b, vset(0)));
   floats away = vabs(vabs(a) - chord * (1 - cusp_bend * u)) * it->half_m[0];
   return vonly((u > 0) & (u < 1) & (a * a + b * b < 1),
@@ -58,10 +59,13 @@ INLINE floats cusps(const tissue_body *it, const float *field, uint32_t n) {
 }
 
 // Walls hide lesions, lumina walls: branches begin in the lumen of their parents. Clot last.
-INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const float *body,
-                    const floats *level, const float *before, floats out[2]) {
+INLINE void vessels(const tissue_job *job, const tissue_point *p, uint32_t line,
+                    const floats *level, floats out[2]) {
   const uint32_t n = job->lines;
-  for (uint32_t v = job->vessels; v-- > 0;) {
+  const tissue_gate *gate = p->gate;
+  const float *before = job->before + LAYER_LEVELS * n + line;
+  for (uint32_t i = gate->vessels; i-- > 0;) {
+    const uint32_t v = gate->vessel[i];
     const ints wall = level[v] < job->vessel[v].wall_m;
     if (vany(wall)) {
       // Where the beam grazes it, the wall is as grey as what lies around it.
@@ -73,31 +77,33 @@ INLINE void vessels(const tissue_job *job, knots *memory, const float *f, const 
     }
     mark(level[v] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
   }
-  for (uint32_t v = 2; v < job->vessels; ++v)
-    mark(level[v] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
-  for (uint32_t k = 0; k < job->bodies; ++k, body += BODY_FIELDS * n)
-    if (job->body[k].kind == SONDE_TISSUE_CUSPS) {
-      const floats bright = cusps(&job->body[k], body, n);
-      for (uint32_t v = 0; v < job->vessels && vany(bright > 0); ++v)
-        mark((level[v] <= 0) & (bright > out[0]), bright, blood_tissue[1], out);
-    }
-  for (uint32_t v = 0; v < job->vessels; ++v) {
+  for (uint32_t i = 0; i < gate->vessels; ++i)
+    if (gate->vessel[i] >= 2)
+      mark(level[gate->vessel[i]] <= 0, vset(blood_tissue[0]), blood_tissue[1], out);
+  for (uint32_t i = 0; i < gate->bodies; ++i) {
+    const uint32_t k = gate->body[i];
+    if (job->body[k].kind != SONDE_TISSUE_CUSPS) continue;
+    const floats bright = cusps(job, &job->body[k], body_place_at(job, p->map, k));
+    for (uint32_t j = 0; j < gate->vessels && vany(bright > 0); ++j)
+      mark((level[gate->vessel[j]] <= 0) & (bright > out[0]), bright, blood_tissue[1], out);
+  }
+  for (uint32_t i = 0; i < gate->vessels; ++i) {
+    const uint32_t v = gate->vessel[i], at = line + vessel_field_at(v, VESSEL_SHORT) * n;
     const tissue_vessel *it = &job->vessel[v];
     if (!(it->clot_fraction > 0)) continue;
-    const float *at = f + vessel_field_at(v, VESSEL_SHORT) * n;
-    ints clot = (level[v] <= 0) & (vload(at + VESSEL_CLOT * n) >= 0.5f);
-    floats theta = vload(f + PLANE_THETA * n), s = vload(f + PLANE_S * n),
-           depth = vload(f + PLANE_DEPTH * n);
+    ints clot = (level[v] <= 0) & (field_at(job, at + VESSEL_CLOT * n) >= 0.5f);
     if (!vany(clot)) continue;
+    const floats a = field_at(job, at);
     if (it->clot_fraction < 1)
-      clot &= -vload(at) > 1 - 2 * it->clot_fraction + clot_surface(it->number, s, vload(at + n));
+      clot &= -a > 1 - 2 * it->clot_fraction +
+                       clot_surface(it->number, p->s, field_at(job, at + VESSEL_LONG * n));
     floats scatter = vset(it->clot_scatter);
     if (!job->plain)
       scatter =
-          scatter * power2(clot_grain(it, memory, theta, s, depth, vload(at)) * 0.16609640474f);
+          scatter * power2(clot_grain(it, p->memory, p->theta, p->s, p->depth, a) * 0.16609640474f);
     if (v == 0 && job->webs > 0 && vany(clot))
-      scatter =
-          scatter * (1 - 0.6f * job->webs) + job->webs * webs(memory, theta, s, depth, vload(at));
+      scatter = scatter * (1 - 0.6f * job->webs) +
+                job->webs * webs(p->memory, p->theta, p->s, p->depth, a);
     mark(clot, scatter, it->clot_loss, out);
   }
 }

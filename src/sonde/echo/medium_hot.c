@@ -3,6 +3,7 @@
 // docs/echo.md.
 #include "base/base.h"
 #include "base/random.h"
+#include "echo/gates.h"
 #include "echo/sound.h"
 #include "sonde/tissue_anatomy.h"
 
@@ -60,12 +61,18 @@ static float knot(int32_t a, int32_t b, uint32_t salt) {
   return (float)((h ^ (h >> 15)) >> 8) * (2.0f / 16777216.0f) - 1;
 }
 
+// A field of the plane in this row of the march.
+static float field_of(const sonde_echo *echo, uint32_t field, uint32_t l) {
+  const float *top = echo->wide[0] + field * echo->padded + l;
+  const float *low = echo->wide[1] + field * echo->padded + l;
+  return *top + echo->wide_share * (*low - *top);
+}
+
 // Value noise in [-1, 1] along a surface, so many cells per metre.
 static float roughness(const sonde_echo *echo, uint32_t l, uint32_t salt, float per_m) {
-  const float *row = echo->row;
-  float r = hypotf(row[PLANE_ACROSS * echo->padded + l], row[PLANE_UP * echo->padded + l]);
-  float round = row[PLANE_THETA * echo->padded + l] * r;
-  float u = round * per_m, v = row[PLANE_S * echo->padded + l] * per_m;
+  float r = hypotf(field_of(echo, PLANE_ACROSS, l), field_of(echo, PLANE_UP, l));
+  float round = field_of(echo, PLANE_THETA, l) * r;
+  float u = round * per_m, v = field_of(echo, PLANE_S, l) * per_m;
   float fu = floorf(u), fv = floorf(v), a = u - fu, b = v - fv;
   int32_t i = (int32_t)fu, j = (int32_t)fv;
   float top = knot(i, j, salt) + a * (knot(i + 1, j, salt) - knot(i, j, salt));
@@ -101,7 +108,7 @@ static void lay(sonde_echo *echo, uint32_t line, uint32_t row, float share, floa
 }
 
 // A level that changes sign between the last row and this one is an interface, which reflects.
-static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crossed) {
+static void add_interfaces(sonde_echo *echo, uint32_t row, const uint16_t *crossed) {
   const uint32_t n = echo->padded, edges = LAYER_LEVELS + echo->shown_count;
   const sonde_lesion *lesion = echo->interior->findings.lesion;
   const float *now = echo->level[row % 2], *before = echo->level[(row + 1) % 2];
@@ -115,6 +122,7 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
   for (uint32_t which = 0; which < echo->levels; ++which) {
     uint32_t count = which == FASCIA && !echo->plain ? FASCIA_SHEETS : 1;
     const bool wall = which >= LAYER_LEVELS && which < edges;
+    if (wall && !(echo->gates->vessels >> (which - LAYER_LEVELS) & 1)) continue;
     const sonde_interior *in = echo->interior;
     if (wall && !echo->plain &&
         in->course[echo->shown[which - LAYER_LEVELS]].kind == SONDE_VESSEL_ARTERY)
@@ -127,7 +135,7 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
     }
   }
   for (uint32_t l = 0; l < echo->lines; ++l) {
-    if (!crossed[l / ECHO_ALIGN] || echo->air[l]) continue;
+    if (!(crossed[l / ECHO_ALIGN] >> l % ECHO_ALIGN & 1) || echo->air[l]) continue;
     for (uint32_t i = 0; i < sheets; ++i) {
       const uint32_t which = sheet[i].level;
       const float *level = now + which * n;
@@ -175,14 +183,14 @@ static void add_interfaces(sonde_echo *echo, uint32_t row, const uint8_t *crosse
 }
 
 // The septa of the fat are sheets, too. Half-way between two the distance jumps.
-static void add_septa(sonde_echo *echo, uint32_t row) {
+static void add_septa(sonde_echo *echo, uint32_t row, const uint16_t *parted) {
   const float *now = echo->septum[row % 2], *before = echo->septum[(row + 1) % 2];
   const float *size = echo->septum[2];
   const float dz = (float)(echo->frame.reach_m / (SONDE_MEDIUM_ROWS - 1));
   const uint32_t n = echo->padded, edges = LAYER_LEVELS + echo->shown_count;
   for (uint32_t l = 0; l < echo->lines; ++l) {
     const float last = before[l], here = now[l], step = here - last;
-    if (!(size[l] > 0) || (last < 0) == (here < 0) || fabsf(step) > 0.8e-3f || echo->air[l])
+    if (!(parted[l / ECHO_ALIGN] >> l % ECHO_ALIGN & 1) || fabsf(step) > 0.8e-3f || echo->air[l])
       continue;
     bool hidden = false;
     for (uint32_t k = LAYER_LEVELS; k < edges; ++k)
@@ -337,35 +345,49 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
 }
 
 // Fields of a row of the march, per line: between two coarse rows, which are widened to the lines
-// when the march reaches them; to rays that bend as they are there, on to where they lead.
-static void find_fields(sonde_echo *echo, uint32_t row, uint32_t *reached) {
-  const uint32_t last = echo->plane_rows - 2, size = echo->fields * echo->padded;
+// when the march reaches them; to rays that bend as they are there, on to where they lead. Of
+// vessels, cells and bodies only what can matter there.
+static void find_fields(sonde_echo *echo, const tissue_job *job, uint32_t row) {
+  const uint32_t last = echo->plane_rows - 2;
   const float y = (float)(row * (last + 1)) / (SONDE_MEDIUM_ROWS - 1);
   const uint32_t j = (uint32_t)y < last ? (uint32_t)y : last;
-  const bool own_speeds = sonde_sound_on(echo);
-  widen_job widen = {.column = echo->line_column, .share = echo->line_share, .lines = echo->padded};
-  SONDE_ASSERT(*reached <= j + 2);
-  if (own_speeds && *reached < j + 2) *reached = j;
-  for (; *reached < j + 2; ++*reached) {
-    if (own_speeds)
-      sonde_sound_aim(echo, ((float)*reached - y) * (SONDE_MEDIUM_ROWS - 1) / (float)(last + 1));
-    for (uint32_t field = 0; field < echo->fields; ++field) {
-      widen.in = echo->plane + field * SONDE_PLANE_NODES + *reached * SONDE_PLANE_COLUMNS;
-      widen.out = echo->wide + *reached % 2 * size + field * echo->padded;
+  sonde_gates *g = echo->gates;
+  echo->wide_share = y - (float)j;
+  if (row > 0 && j == g->row) return;
+  g->row = j;
+  for (uint32_t k = 0; k < 2 && (row == 0 || sonde_sound_on(echo)); ++k)
+    sonde_sound_aim(echo, k, ((float)(j + k) - y) * (SONDE_MEDIUM_ROWS - 1) / (float)(last + 1));
+  sonde_gates_find(echo, job, j);
+  const uint32_t cells = map_field_at(job->vessels, job->lesions, 1), bodies = cells + job->cells;
+  for (uint32_t field = 0; field < echo->fields; ++field) {
+    bool wanted = true;
+    if (field >= bodies && job->cells > 0)
+      wanted = g->bodies >> ((field - bodies) / BODY_FIELDS) & 1;
+    else if (field >= cells && job->cells > 0)
+      wanted = g->cells >> (field - cells) & 1;
+    else if (field >= PLANE_LAYERS && field < lesion_field_at(job->vessels, 0, 0))
+      wanted = g->vessels >> ((field - PLANE_LAYERS) / VESSEL_FIELDS) & 1;
+    for (uint32_t k = 0; k < 2 && wanted; ++k) {
+      const widen_job widen = {.in = echo->plane + field * SONDE_PLANE_NODES +
+                                     (j + k) * SONDE_PLANE_COLUMNS,
+                               .column = g->column[k],
+                               .share = g->share[k],
+                               .out = echo->wide[k] + field * echo->padded,
+                               .lines = echo->padded};
       echo->kernels->widen(&widen);
     }
   }
-  echo->kernels->mix(echo->wide + j % 2 * size, echo->wide + (j + 1) % 2 * size, y - (float)j,
-                     echo->row, size);
 }
 
 void sonde_echo_medium(sonde_echo *echo) {
   const frame *f = &echo->frame;
   SONDE_ASSERT(f->pathology != NULL && echo->padded % ECHO_ALIGN == 0);
-  uint32_t lines = echo->padded, reached = 0;
+  uint32_t lines = echo->padded;
   float step = (float)(2 * f->reach_m / (SONDE_MEDIUM_ROWS - 1) * f->frequency_hz * 1e-6);
-  uint8_t crossed[SONDE_MOST_LINES / ECHO_ALIGN];
-  tissue_job job = {.row = echo->row,
+  uint16_t crossed[SONDE_MOST_LINES / ECHO_ALIGN], parted[SONDE_MOST_LINES / ECHO_ALIGN];
+  tissue_job job = {.top = echo->wide[0],
+                    .low = echo->wide[1],
+                    .gate = echo->gates->block,
                     .lines = lines,
                     .bone_radius_m = (float)echo->interior->bone_radius_m,
                     .plain = echo->plain,
@@ -375,24 +397,25 @@ void sonde_echo_medium(sonde_echo *echo) {
                     .loss = echo->loss,
                     .rough = echo->rough,
                     .septum_size = echo->septum[2],
-                    .crossed = crossed};
+                    .crossed = crossed,
+                    .parted = parted};
   describe_tissue(echo, &job);
   memset(echo->loss_db, 0, lines * sizeof *echo->loss_db);
   memset(echo->tail, 0, lines * sizeof *echo->tail);
   sonde_sheet_begin(echo);
   echo->some_air = false;
   sonde_sound_begin(echo);
-  sonde_sound_aim(echo, 0);
   for (uint32_t row = 0; row < SONDE_MEDIUM_ROWS; ++row) {
-    find_fields(echo, row, &reached);
-    job.septum = echo->septum[row % 2];
+    find_fields(echo, &job, row);
+    job.share = echo->wide_share;
+    job.septum = echo->septum[row % 2], job.septum_before = echo->septum[(row + 1) % 2];
     job.level = echo->level[row % 2], job.before = echo->level[(row + 1) % 2];
     echo->kernels->tissue(&job);
     job.rows_per_m = (float)((SONDE_MEDIUM_ROWS - 1) / f->reach_m);
     // Lines whose face does not touch the skin. A face reverberates: bands at multiples of its own
     // thickness, fading, as loud as what does not couple in.
     for (uint32_t l = 0; row == 0 && l < lines; ++l) {
-      echo->air[l] = echo->row[PLANE_DEPTH * echo->padded + l] < -air_gap_m;
+      echo->air[l] = field_of(echo, PLANE_DEPTH, l) < -air_gap_m;
       echo->some_air = echo->some_air || echo->air[l];
       const float loudness = echo->air[l] ? 1 : 1 - echo->coupling[l];
       for (int k = 0; k < 6 && l < echo->lines; ++k)
@@ -403,7 +426,7 @@ void sonde_echo_medium(sonde_echo *echo) {
     blur(echo, echo->tail);
     if (sonde_sound_on(echo)) sonde_sound_step(echo, row);
     if (row > 0) add_interfaces(echo, row, crossed);
-    if (row > 0 && !echo->plain) add_septa(echo, row);
+    if (row > 0 && !echo->plain) add_septa(echo, row, parted);
     for (uint32_t l = 0; l < lines && echo->some_air; ++l)
       if (echo->air[l]) echo->scatter[l] = echo->rough[l] = 0;
     for (uint32_t l = 0; l < lines; ++l) {

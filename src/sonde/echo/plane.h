@@ -37,6 +37,13 @@ enum {
                 MOST_CELLS + MOST_BODIES * BODY_FIELDS
 };
 
+// What can matter for some lines between two coarse rows: numbers of vessels, of seeds of muscles'
+// cells and of bodies in view, ascending.
+typedef struct tissue_gate {
+  uint8_t vessels, cells, bodies;
+  uint8_t vessel[MOST_VESSELS], cell[MOST_CELLS], body[MOST_BODIES];
+} tissue_gate;
+
 static inline uint32_t vessel_field_at(uint32_t vessel, vessel_field field) {
   return (uint32_t)PLANE_LAYERS + vessel * VESSEL_FIELDS + (uint32_t)field;
 }

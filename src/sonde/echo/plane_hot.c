@@ -14,6 +14,10 @@ static const double step_beside = 1e-3;
 static const double tolerance_m = 1e-7;
 static const double far_view_m = 60e-3;   // of a vessel from where it is at rest, and its reach
 static const double view_margin_m = 8e-3; // slab, a cube and the step between two sections
+// A wall so far from a node matters in no cell of the plane about it; a row brings it nearer by
+// twice the rows' distance at most.
+static const double wall_apart_m = 8e-3;
+enum { MOST_IDLE = 8 };
 
 const sonde_pathology *sonde_echo_pathology(const sonde_echo *echo, uint32_t which) {
   return which == 0 ? echo->frame.pathology : &echo->interior->pathology[which];
@@ -34,8 +38,10 @@ static bool in_view(const sonde_echo *echo, sonde_vec3 point, double reach_m) {
   return fabs(at.y) < reach && beside < reach && above < reach;
 }
 
-// Fields of a node whose rest point is known.
-static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
+// Fields of a node whose rest point is known; the tissue map's where it is asked. `idle`: per
+// vessel rows from here on in which it cannot come near; fields of the row above stand for those.
+static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point, bool mapped,
+                       uint8_t idle[MOST_VESSELS]) {
   const uint32_t count = SONDE_PLANE_NODES;
   const sonde_interior *in = echo->interior;
   const sonde_vec3 rest = echo->node[node].rest;
@@ -54,12 +60,19 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
   p[PLANE_UP * count] = (float)(at.r * sin(at.theta));
   const struct sonde_tissue_map *map = in->model->map;
   sonde_tissue_depths depths;
-  if (map != NULL) map->depths(map->self, rest, &depths);
-  p[PLANE_BONE * count] = map == NULL ? 0 : (float)(at.r - in->bone_radius_m - depths.bone_m);
+  if (mapped) map->depths(map->self, rest, &depths);
+  p[PLANE_BONE * count] = mapped ? (float)(at.r - in->bone_radius_m - depths.bone_m) : 0;
   // Coordinates in the deformed sections of the vessels. Beyond its end a branch fades away from
   // the last section: neighbours inside and beyond then meet without passing its axis.
   for (uint32_t k = 0; k < echo->shown_count; ++k) {
     const uint32_t which = echo->shown[k], sections = in->course[which].count;
+    float *field = p + vessel_field_at(k, VESSEL_SHORT) * count;
+    if (idle[k] > 0) {
+      --idle[k];
+      const float *above = field - SONDE_PLANE_COLUMNS;
+      for (uint32_t c = 0; c < VESSEL_FIELDS; ++c) field[c * count] = above[c * count];
+      continue;
+    }
     sonde_vessel_state v;
     double across = far_away, along = far_away, half_short = 1e-3, half_long = 1e-3, clot = 0;
     const double place = sonde_vessel_along(in, which, rest, at.s);
@@ -77,7 +90,8 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
       double size = fmax(hypot(along, across), 1e-3);
       along *= far_away / size, across *= far_away / size;
     }
-    float *field = p + vessel_field_at(k, VESSEL_SHORT) * count;
+    const double apart = (hypot(along, across) - 1) * fmin(half_short, half_long) - wall_apart_m;
+    if (there && apart > 0) idle[k] = (uint8_t)fmin(apart / (2 * echo->depth_per_row), MOST_IDLE);
     field[VESSEL_SHORT * count] = (float)along;
     field[VESSEL_LONG * count] = (float)across;
     field[VESSEL_HALF_SHORT * count] = (float)half_short;
@@ -85,7 +99,7 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
     field[VESSEL_CLOT * count] = (float)clot;
   }
   // Fasciae and muscles as the tissue map has them.
-  if (map != NULL) {
+  if (mapped) {
     double power[MOST_CELLS];
     float *field = p + map_field_at(echo->shown_count, echo->lesion_count, 0) * count;
     map->powers(map->self, rest, echo->cell_count, echo->cell, power, NULL);
@@ -104,6 +118,19 @@ static void store_node(sonde_echo *echo, uint32_t node, sonde_vec3 point) {
     sonde_vec3 q = sonde_lesion_point(in, echo->lesion[k], rest);
     float *field = p + lesion_field_at(echo->shown_count, k, 0) * count;
     for (int c = 0; c < 3; ++c) field[c * (int)count] = (float)v_coordinate(q, c);
+  }
+}
+
+// Fields between two rows in which the tissue map was asked: it is smooth over two rows, but bodies
+// end.
+static void fill_row(sonde_echo *echo, uint32_t j, uint32_t field, bool smooth) {
+  const uint32_t wide = SONDE_PLANE_COLUMNS;
+  float *row = echo->plane + field * SONDE_PLANE_NODES + j * wide;
+  smooth = smooth && j >= 3 && j + 3 < echo->plane_rows;
+  for (uint32_t i = 0; i < wide; ++i) {
+    float *at = row + i;
+    const float near = at[-(int)wide] + at[wide];
+    *at = smooth ? 0.5625f * near - 0.0625f * (at[-3 * (int)wide] + at[3 * wide]) : 0.5f * near;
   }
 }
 
@@ -274,6 +301,8 @@ void sonde_echo_plane(sonde_echo *echo) {
   (void)sonde_interior_locate(echo->interior, f->probe.position, &centre);
   echo->theta_centre = centre.theta;
   find_in_view(echo);
+  const bool map = echo->interior->model->map != NULL;
+  uint8_t idle[SONDE_PLANE_COLUMNS][MOST_VESSELS] = {{0}};
   sonde_fields_begin(echo->motion, echo->interior, f->probe.position);
   for (uint32_t j = 0; j < echo->plane_rows; ++j) {
     seeker row[SONDE_PLANE_COLUMNS];
@@ -287,8 +316,15 @@ void sonde_echo_plane(sonde_echo *echo) {
       sonde_vec3 here = v_sub(row[i].point, node[i].rest); // what the inversion converged to
       sonde_vec3 at = image_step(echo, &row[i], v_add(beside, v_sub(there[i], here)));
       node[i].side = vec3(at.x / step_beside, at.y / step_beside, at.z / step_beside);
-      store_node(echo, j * SONDE_PLANE_COLUMNS + i, row[i].point);
+      store_node(echo, j * SONDE_PLANE_COLUMNS + i, row[i].point,
+                 map && (j % 2 == 0 || j + 1 == echo->plane_rows), idle[i]);
     }
+  }
+  const uint32_t first = map_field_at(echo->shown_count, echo->lesion_count, 0);
+  for (uint32_t j = 1; map && j + 1 < echo->plane_rows; j += 2) {
+    fill_row(echo, j, PLANE_MUSCLE, true), fill_row(echo, j, PLANE_BONE, true);
+    for (uint32_t field = first; field < echo->fields; ++field)
+      fill_row(echo, j, field, field <= first + echo->cell_count);
   }
   // The derivatives of image coordinates: rows of the inverse are the crossed columns over the
   // volume.

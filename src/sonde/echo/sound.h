@@ -49,8 +49,8 @@ static inline bool sonde_sound_on(const sonde_echo *echo) { return echo->scanner
 
 // Rays at the face.
 void sonde_sound_begin(sonde_echo *echo);
-// Coarse columns of the rays so many rows of the march on: line_column and line_share.
-void sonde_sound_aim(sonde_echo *echo, float rows_on);
+// Coarse columns of the rays so many rows of the march on, for the upper or the lower coarse row.
+void sonde_sound_aim(sonde_echo *echo, uint32_t which, float rows_on);
 // A step to this row, whose levels are known.
 void sonde_sound_step(sonde_echo *echo, uint32_t row);
 // What the passage of an interface costs both ways, dB: between the tissues on both sides of a

@@ -5,6 +5,7 @@
 #include "echo/sound.h"
 
 #include "base/base.h"
+#include "echo/gates.h"
 
 // Speeds of sound, m/s, and densities, kg/m^3 (IT'IS database of tissue properties 4.1; fat and
 // muscle: means of Duck, Physical Properties of Tissue, 1990).
@@ -40,9 +41,10 @@ void sonde_sound_begin(sonde_echo *echo) {
     s->turn[l] = s->shown[l] = s->before[l] = s->mean[l] = 0;
     s->slow[l] = 0, s->spread[l] = 1, s->next[l / 4] = 0;
   }
+  echo->gates->vessels = UINT32_MAX;
 }
 
-void sonde_sound_aim(sonde_echo *echo, float rows_on) {
+void sonde_sound_aim(sonde_echo *echo, uint32_t which, float rows_on) {
   const sonde_sound *s = echo->sound;
   const float on = rows_on * row_m(echo) * lines_per_m(&echo->frame, s->shown[0]);
   const float edge = (float)echo->frame.edge_lines, scale = (float)(1 / echo->lines_per_column);
@@ -52,7 +54,7 @@ void sonde_sound_aim(sonde_echo *echo, float rows_on) {
     last = fmaxf(x, last); // ascending
     const uint32_t i =
         (uint32_t)last < SONDE_PLANE_COLUMNS - 2 ? (uint32_t)last : SONDE_PLANE_COLUMNS - 2;
-    echo->line_column[l] = (int32_t)i, echo->line_share[l] = last - (float)i;
+    echo->gates->column[which][l] = (int32_t)i, echo->gates->share[which][l] = last - (float)i;
   }
 }
 
@@ -77,8 +79,10 @@ static void find_slowness(sonde_echo *echo, uint32_t row) {
     part[parts].level = edges + k, part[parts].side = -1;
     part[parts++].slow = c0 / (cyst ? fluid.speed : blood.speed);
   }
-  for (uint32_t k = walls; k < edges; ++k)
+  for (uint32_t k = walls; k < edges; ++k) {
+    if (!(echo->gates->vessels >> (k - walls) & 1)) continue;
     part[parts].level = k, part[parts].side = -1, part[parts++].slow = c0 / blood.speed;
+  }
   const float_x4 none = vset_float_x4(0), one = vset_float_x4(1);
   // The fat's septa are thinner than a row is deep, which they fill in part.
   const float *septum = echo->septum[row % 2], *strength = echo->septum[2];
