@@ -13,18 +13,17 @@ link() { # PAGE: a page of docs/ as a link, any other file by its path
   if [[ $name == "$1" ]]; then printf '`%s`' "$1"; else printf '[%s](%s)' "$name" "$name"; fi
 }
 
-trim() { sed -E 's/^ +| +$//g' <<<"$1"; }
-
 table() {
   local group room does pages page links
   echo
   echo '| library | room | does | read |'
   echo '|---|---|---|---|'
   while IFS='|' read -r room does pages; do
-    read -r group room <<<"$room"
+    read -r group room <<<"$room" # without blanks around
+    read -r does <<<"$does"
     links=
     for page in $pages; do links+="${links:+, }$(link "$page")"; done
-    echo "| \`$group\` | \`$(trim "$room")\` | $(trim "$does") | $links |"
+    echo "| \`$group\` | \`$room\` | $does | $links |"
   done < <(grep -vE '^(#|$)' "$root/src/rooms.txt")
   echo
 }
