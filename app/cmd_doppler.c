@@ -132,7 +132,7 @@ typedef struct blood {
   sonde_flow_def flow;
 } blood;
 
-static const double STEP_S = 1e-3, LONGEST_WINDOW_S = SONDE_DOPPLER_BINS / 500.0;
+static const double STEP_S = 1e-3, LONGEST_WINDOW_S = SONDE_DOPPLER_PULSES / 500.0;
 
 // Mean velocity and profile a step after `n - 1`, or at the start.
 static void follow(const blood *b, uint32_t n, double profile[SONDE_FLOW_RINGS]) {
@@ -199,15 +199,15 @@ static sonde_status take(const options *a, const sonde_model *model, record *r,
   sonde_doppler *doppler = NULL;
   if (!status) status = sonde_doppler_create(&def, &doppler, error);
   r->count = (uint32_t)(a->seconds / HOP_S), r->limit = sonde_doppler_limit(&def);
-  // Slower blood leaks through the filter's edge, up to one and a half bins beyond it.
-  r->slowest = 2 * r->limit * (def.filter_hz / def.pulse_hz + 1.5 / SONDE_DOPPLER_BINS);
+  // The spectrum of slower blood reaches into the filter: a window blurs it by two of its bins.
+  const double window_s = fmax(SONDE_DOPPLER_WINDOW_S, SONDE_DOPPLER_PULSES / def.pulse_hz);
+  r->slowest = 2 * r->limit * (def.filter_hz + 2 / window_s) / def.pulse_hz;
   r->mean = calloc(r->count, sizeof *r->mean), r->peak = calloc(r->count, sizeof *r->peak);
   r->truth = calloc(r->count, sizeof *r->truth), r->lumen = calloc(r->count, sizeof *r->lumen);
   r->grey = calloc(r->count, SONDE_DOPPLER_BINS);
   double *power = calloc(r->count, SONDE_DOPPLER_BINS * sizeof *power), most = 0;
   if (!status && !(r->mean && r->peak && r->truth && r->lumen && r->grey && power))
     status = app_error(error, SONDE_MEMORY, "out of memory");
-  const double window_s = SONDE_DOPPLER_BINS / def.pulse_hz;
   double time = -0.5 * window_s, profile[SONDE_FLOW_RINGS];
   uint64_t pulses = 0;
   uint32_t step = 0;

@@ -140,7 +140,9 @@ SONDE_API void sonde_flow_pulsed(const double *mean_m_s, uint32_t samples, doubl
 
 /* ---- pulsed Doppler ----------------------------------------------------------------------- */
 
-enum { SONDE_DOPPLER_BINS = 128 };
+/** A spectrum is that of the pulses of so much time, at least of so many. */
+#define SONDE_DOPPLER_WINDOW_S 0.04
+enum { SONDE_DOPPLER_BINS = 128, SONDE_DOPPLER_PULSES = 128 };
 
 /** A gate on a vessel and the chain behind it. */
 typedef struct sonde_doppler_def {
@@ -164,12 +166,12 @@ SONDE_API void sonde_doppler_destroy(sonde_doppler *doppler); /**< NULL is fine.
 SONDE_API void sonde_doppler_pulse(sonde_doppler *doppler,
                                    const double profile_m_s[SONDE_FLOW_RINGS]);
 
-/** What the last SONDE_DOPPLER_BINS pulses hold. */
+/** What the last pulses hold. */
 typedef struct sonde_doppler_spectrum {
   double
       power[SONDE_DOPPLER_BINS]; /**< by velocity, from the lowest that is shown to the highest */
   double velocity_m_s[SONDE_DOPPLER_BINS]; /**< corrected by the angle */
-  double mean_m_s;                         /**< power-weighted */
+  double mean_m_s; /**< power-weighted; what the filter took goes on evenly between its edges */
   double peak_m_s; /**< edge of the spectrum away from zero, 99 % of the power below it */
 } sonde_doppler_spectrum;
 /** Hann-weighted spectrum, wall filter applied; zeros until there are as many pulses. @thread tick
@@ -179,7 +181,8 @@ SONDE_API void sonde_doppler_read(const sonde_doppler *doppler, sonde_doppler_sp
  * without walls, noise, filter and chance would be. @thread any */
 SONDE_API double sonde_doppler_truth(const sonde_doppler *doppler,
                                      const double profile_m_s[SONDE_FLOW_RINGS]);
-/** Velocity from the phase between neighbouring pulses of the same window. @thread tick */
+/** Velocity from the phase between neighbours of the last SONDE_DOPPLER_BINS pulses. @thread tick
+ */
 SONDE_API double sonde_doppler_phase_velocity(const sonde_doppler *doppler);
 /** Highest velocity that is not folded: c pulse_hz / (4 f |cos angle|). @thread any */
 SONDE_API double sonde_doppler_limit(const sonde_doppler_def *def);

@@ -45,9 +45,9 @@ SONDE_API sonde_gate_settings sonde_gate_clean(const sonde_gate_settings *wanted
 
 /** The spectrum at one time. */
 typedef struct sonde_gate_column {
-  uint64_t number;          /**< times SONDE_GATE_COLUMN_S: when its last pulse was sent */
-  float mean_m_s, peak_m_s; /**< power-weighted; the edge away from zero, with 99 % of the power
-                                 below it; 0: nothing but noise */
+  uint64_t number; /**< times SONDE_GATE_COLUMN_S: when its last pulse was sent */
+  float mean_m_s;  /**< power-weighted; what the filter took goes on evenly between its edges */
+  float peak_m_s;  /**< edge away from zero, 99 % of the power below it; 0: nothing but noise */
   uint8_t
       power[SONDE_DOPPLER_BINS]; /**< from the lowest velocity that is shown; 0 to 255 are 36 dB */
 } sonde_gate_column;

@@ -267,6 +267,28 @@ static void test_fan_gate(void **unused) {
   }
 }
 
+// However often pulses are sent, a column has those of 40 ms: slow blood is read as truly where the
+// axis is ten times as wide as it needs.
+static void test_window(void **unused) {
+  (void)unused;
+  leg l;
+  sonde_flow_scene *scene = NULL;
+  sonde_flow flow;
+  open_along(&l, &scene, &flow);
+  sonde_vessel_state vein;
+  assert_true(sonde_interior_vessel_at_plane(l.in, 0, tube_pose(radius, length / 2), &vein));
+  const sonde_vec3 at = pose_apply_inverse(l.pose, vein.centre_m);
+  sonde_gate_settings s = sonde_gate_settings_default();
+  s.x_m = at.x, s.z_m = at.z, s.steer_rad = 0.35, s.scale_m_s = 0.5, s.filter_hz = 20;
+  const heard h = listen(&l, scene, &flow, &s, 0);
+  print_message("%.0f pulses a second in %.0f ms: mean %.2f of %.2f cm/s\n", h.axes.pulse_hz,
+                1e3 * h.axes.window_s, 100 * h.mean, 100 * h.truth);
+  assert_near(h.axes.window_s, 0.04, 1e-4);
+  assert_near(h.mean / h.truth, 1, 0.05);
+  sonde_flow_scene_destroy(scene);
+  close_leg(&l);
+}
+
 // Colour before a curved face: the parabola of the vein's steady flow along each line, the truth of
 // the cells and the estimate alike.
 static void test_fan_colour(void **unused) {
@@ -347,10 +369,10 @@ static void test_cleans(void **unused) {
 }
 
 int main(int argc, char **argv) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_conserves), cmocka_unit_test(test_gate),
-                                     cmocka_unit_test(test_fan_gate),
-                                     cmocka_unit_test(test_fan_colour),
-                                     cmocka_unit_test(test_cleans)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_conserves),  cmocka_unit_test(test_gate),
+      cmocka_unit_test(test_window),     cmocka_unit_test(test_fan_gate),
+      cmocka_unit_test(test_fan_colour), cmocka_unit_test(test_cleans)};
   if (argc > 1) cmocka_set_test_filter(argv[1]);
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,6 +8,8 @@
 #include "base/random.h"
 #include "flow/spectrum.h"
 
+#include <string.h>
+
 enum { SCATTERERS = 260, BINS = SONDE_DOPPLER_BINS };
 static const double sound_m_s = 1540, beyond_beam = 3, spare_m = 1.2e-3;
 
@@ -24,7 +26,7 @@ struct sonde_doppler {
   double blood;                  // root mean square of the blood's echo
   double ring[SONDE_FLOW_RINGS]; // share of each ring in the gate, by power
   uint64_t pulses;
-  double echo[BINS][2]; // of the last pulses, pulse p at p % BINS
+  double echo[SPECTRUM_MOST][2]; // of the last pulses, pulse p at p % SPECTRUM_MOST
   scatterer at[SCATTERERS];
 };
 
@@ -38,7 +40,7 @@ sonde_doppler_def sonde_doppler_def_default(void) {
                              .half_long_m = 4.5e-3,
                              .clutter_db = 30,
                              .noise_db = -12,
-                             .filter_hz = 60};
+                             .filter_hz = 20};
 }
 
 double sonde_doppler_limit(const sonde_doppler_def *def) {
@@ -148,16 +150,16 @@ void sonde_doppler_pulse(sonde_doppler *d, const double profile_m_s[SONDE_FLOW_R
     sum[1] += c * s->echo[1] + q * s->echo[0];
   }
   double noise = pow(10, def->noise_db / 20) / sqrt(2), wall = pow(10, def->clutter_db / 20);
-  double *echo = d->echo[d->pulses++ % BINS];
+  double *echo = d->echo[d->pulses++ % SPECTRUM_MOST];
   for (int c = 0; c < 2; ++c)
     echo[c] =
         sum[c] / d->blood + noise * sonde_random_normal(def->seed, d->drawn++) + (c ? 0 : wall);
 }
 
-// The echoes of the window in the order of time.
-static void hear(const sonde_doppler *d, double echo[BINS][2]) {
-  for (int n = 0; n < BINS; ++n)
-    for (int c = 0; c < 2; ++c) echo[n][c] = d->echo[(d->pulses + (uint64_t)n) % BINS][c];
+// The last echoes in the order of time.
+static void hear(const sonde_doppler *d, uint32_t count, double (*echo)[2]) {
+  for (uint32_t n = 0; n < count; ++n)
+    memcpy(echo[n], d->echo[(d->pulses - count + n) % SPECTRUM_MOST], sizeof echo[n]);
 }
 
 void sonde_doppler_read(const sonde_doppler *d, sonde_doppler_spectrum *out) {
@@ -165,25 +167,29 @@ void sonde_doppler_read(const sonde_doppler *d, sonde_doppler_spectrum *out) {
   *out = (sonde_doppler_spectrum){.mean_m_s = 0};
   const double limit = sonde_doppler_limit(&d->def);
   for (int b = 0; b < BINS; ++b) out->velocity_m_s[b] = limit * (b - BINS / 2) / (BINS / 2);
-  if (d->pulses < BINS) return;
-  double echo[BINS][2], power[BINS];
-  hear(d, echo);
-  spectrum_take(echo, BINS, power);
+  const uint32_t count = spectrum_window(d->def.pulse_hz);
+  if (d->pulses < count) return;
+  double echo[SPECTRUM_MOST][2], power[SPECTRUM_MOST], kept[SPECTRUM_MOST], velocity[SPECTRUM_MOST];
+  hear(d, count, echo);
+  spectrum_take(echo, count, power);
   // Towards the probe is a positive shift; away from it the spectrum is turned round.
   const bool away = cos(d->def.angle_rad) < 0;
-  for (int b = 0; b < BINS; ++b) {
-    const int shift = b - BINS / 2;
-    const bool kept = abs(shift) * d->def.pulse_hz / BINS >= fmax(d->def.filter_hz, 0);
-    out->power[b] = kept ? power[away ? (BINS - b) % BINS : b] : 0;
+  const int bins = (int)spectrum_bins(count);
+  for (int b = 0; b < bins; ++b) {
+    const int shift = b - bins / 2;
+    const bool passed = abs(shift) * d->def.pulse_hz / bins >= fmax(d->def.filter_hz, 0);
+    kept[b] = passed ? power[away ? (bins - b) % bins : b] : 0;
+    velocity[b] = limit * shift / (bins / 2);
   }
-  spectrum_read(out->power, out->velocity_m_s, &out->mean_m_s, &out->peak_m_s);
+  spectrum_read(count, kept, velocity, (uint32_t)bins, &out->mean_m_s, &out->peak_m_s);
+  spectrum_rows(kept, (uint32_t)bins, out->power);
 }
 
 double sonde_doppler_phase_velocity(const sonde_doppler *d) {
   SONDE_ASSERT(d != NULL);
   if (d->pulses < BINS) return 0;
   double echo[BINS][2], wall[2] = {0, 0}, real = 0, imaginary = 0;
-  hear(d, echo);
+  hear(d, BINS, echo);
   // The walls do not move: their echo is the mean.
   for (int n = 0; n < BINS; ++n)
     for (int c = 0; c < 2; ++c) wall[c] += echo[n][c] / BINS;

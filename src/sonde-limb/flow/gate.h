@@ -3,6 +3,7 @@
 #define SONDE_SRC_FLOW_GATE_H
 
 #include "flow/scene.h"
+#include "flow/spectrum.h"
 #include "sonde/flow_gate.h"
 
 enum { GATE_SCATTERERS = 400, GATE_PULSES = 24 };
@@ -25,7 +26,7 @@ struct sonde_gate {
   double tissue, heard;   // amplitudes: of the tissue in the gate, and as it is heard by now
   double tissue_phase;
   uint64_t pulses, next; // since the columns began; number of the next pulse, from time 0
-  double echo[SONDE_DOPPLER_BINS][2];
+  double echo[SPECTRUM_MOST][2];
   uint64_t number; // of the last column
   uint32_t count;
   sonde_gate_column column[SONDE_GATE_COLUMNS]; // a ring, column n at n % SONDE_GATE_COLUMNS

@@ -6,23 +6,17 @@
 #include "base/random.h"
 #include "echo/truth.h"
 #include "flow/colour.h"
-#include "flow/spectrum.h"
 
 enum { BINS = SONDE_DOPPLER_BINS };
 static const double beam_m = 0.45e-3; // standard deviation across; twice that beside the plane
 static const double reach = 2.5;      // of them that scatterers fill
 static const double edge_m = 0.3e-3;  // over which the gate's ends fade: the pulse's length
 static const double tissue_db = 30, aside_db = 20, noise_db = -12; // over a gate full of blood
-static const double window_s = 0.04, least_hz = 250, most_hz = 2e4;
-enum { LEAST_WINDOW = 32 };
+static const double least_hz = 250, most_hz = 2e4;
 
 void sonde_gate_forget(sonde_gate *g) {
   SONDE_ASSERT(g != NULL);
   g->put = g->drawn = false, g->count = 0;
-}
-
-static uint32_t window_of(const sonde_gate *g) {
-  return (uint32_t)clamp(round(window_s * g->pulse_hz), LEAST_WINDOW, BINS);
 }
 
 // Weights of a place in the gate, of its echo's amplitude: of the beam, and along it.
@@ -151,27 +145,33 @@ static void add_echoes(const sonde_gate *g, const gate_scatterer *s, double spee
 
 // The spectrum of the last pulses as a column.
 static void add_column(sonde_gate *g) {
-  double echo[BINS][2], power[BINS], turned[BINS], velocity[BINS], mean, peak;
-  const uint32_t count = window_of(g);
+  double echo[SPECTRUM_MOST][2], power[SPECTRUM_MOST], turned[SPECTRUM_MOST],
+      velocity[SPECTRUM_MOST], mean, peak;
+  const uint32_t count = spectrum_window(g->pulse_hz);
   for (uint32_t n = 0; n < count; ++n)
-    for (int c = 0; c < 2; ++c) echo[n][c] = g->echo[(g->pulses - count + n) % BINS][c];
+    for (int c = 0; c < 2; ++c) echo[n][c] = g->echo[(g->pulses - count + n) % SPECTRUM_MOST][c];
   spectrum_take(echo, count, power);
   const sonde_gate_spectrum axes = sonde_gate_axes(g);
-  const int shift = (int)lround(g->settings.baseline * (BINS / 2));
+  const int bins = (int)spectrum_bins(count), each = bins / BINS,
+            shift = each * (int)lround(g->settings.baseline * (BINS / 2));
   const double filter_hz = fmin(g->settings.filter_hz, g->pulse_hz / 4);
-  sonde_gate_column *column = &g->column[g->number % SONDE_GATE_COLUMNS];
-  for (int row = 0; row < BINS; ++row) {
-    const int bin = (row + shift + BINS) % BINS;
-    const bool kept = abs(bin - BINS / 2) * g->pulse_hz / BINS >= filter_hz;
+  for (int row = 0; row < bins; ++row) {
+    const int bin = (row + shift + bins) % bins;
+    const bool kept = abs(bin - bins / 2) * g->pulse_hz / bins >= filter_hz;
     turned[row] = kept ? power[bin] : 0;
-    velocity[row] = axes.low_m_s + (row + 0.5) * 2 * axes.limit_m_s / BINS;
+    velocity[row] = axes.low_m_s + ((double)row / each + 0.5) * 2 * axes.limit_m_s / BINS;
+  }
+  spectrum_read(count, turned, velocity, (uint32_t)bins, &mean, &peak);
+  double row[BINS];
+  spectrum_rows(turned, (uint32_t)bins, row);
+  sonde_gate_column *column = &g->column[g->number % SONDE_GATE_COLUMNS];
+  for (int r = 0; r < BINS; ++r) {
     // Noise alone has its power here, whatever the window.
-    const double db = 10 * log10(fmax(turned[row] / (0.375 * count), 1e-12));
+    const double db = 10 * log10(fmax(row[r] / (0.375 * count), 1e-12));
     const double darkest_db = -12, range_db = 36;
-    column->power[row] =
+    column->power[r] =
         (uint8_t)lrint(255 * clamp((db + g->settings.gain_db - darkest_db) / range_db, 0, 1));
   }
-  spectrum_read(turned, velocity, &mean, &peak);
   column->number = g->number, column->mean_m_s = (float)mean, column->peak_m_s = (float)peak;
   if (g->count < SONDE_GATE_COLUMNS) ++g->count;
 }
@@ -214,7 +214,7 @@ void gate_step(sonde_gate *g, const sonde_flow_scene *scene, double step_s) {
   // What a new picture makes of the tissue comes gently: a step would be heard at all frequencies.
   const double gentle_s = 0.1, follows = 1 - exp(-1 / (gentle_s * g->pulse_hz));
   for (uint32_t p = 0; p < pulses; ++p) {
-    double *echo = g->echo[g->pulses++ % BINS];
+    double *echo = g->echo[g->pulses++ % SPECTRUM_MOST];
     g->heard += follows * (g->tissue - g->heard);
     g->tissue_phase = fmod(g->tissue_phase + turns, 2 * SONDE_PI);
     echo[0] = left * (sum[p][0] + g->heard * cos(g->tissue_phase));
@@ -225,7 +225,7 @@ void gate_step(sonde_gate *g, const sonde_flow_scene *scene, double step_s) {
   const uint64_t number = (uint64_t)floor(fmax(time_s, 0) / SONDE_GATE_COLUMN_S + 1e-6);
   if (number == g->number) return;
   g->number = number;
-  if (g->pulses >= window_of(g)) add_column(g);
+  if (g->pulses >= spectrum_window(g->pulse_hz)) add_column(g);
 }
 
 uint32_t sonde_gate_columns(const sonde_gate *g, sonde_gate_column *column) {
@@ -243,7 +243,7 @@ sonde_gate_spectrum sonde_gate_axes(const sonde_gate *g) {
   return (sonde_gate_spectrum){.on = true,
                                .settings = g->settings,
                                .pulse_hz = g->pulse_hz,
-                               .window_s = window_of(g) / g->pulse_hz,
+                               .window_s = spectrum_window(g->pulse_hz) / g->pulse_hz,
                                .limit_m_s = limit_m_s,
                                .low_m_s = limit_m_s * shift / (BINS / 2)};
 }
