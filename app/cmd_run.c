@@ -16,7 +16,7 @@ enum { MAX_PROBES = 16 };
 
 typedef struct options {
   const char *model, *record, *probe, *pathology, *preset, *compare;
-  const char *trainee, *exams, *cases, *protocols, *course, *scanner;
+  const char *trainee, *exams, *cases, *own_cases, *protocols, *course, *scanner;
   const char *igtl, *push;
   long port, images_hz;
   double seconds, gel_m3;
@@ -95,6 +95,9 @@ static const app_option TABLE[] = {
              "where exams are kept: recording, data, report and the log of all (exams.sqlite); "
              "default: sonde/exams in $XDG_DATA_HOME or ~/.local/share"),
     OPT_TEXT(cases, "cases", "DIR", "other cases than those that ship"),
+    OPT_TEXT(own_cases, "own-cases", "DIR",
+             "where the cases made on the page are kept; default: sonde/cases in $XDG_DATA_HOME or "
+             "~/.local/share"),
     OPT_TEXT(protocols, "protocols", "DIR", "other protocols than those that ship"),
     OPT_TEXT(course, "course", "DIR", "another course than the one that ships"),
     OPT_FLAG(json, "json", "headless: print one JSON object at the end")};
@@ -211,14 +214,16 @@ static sonde_status run_page(const options *s, const sonde_session_def *session_
 // Practice, exams and replays.
 static sonde_status run_exams(const options *s, const sonde_model *model,
                               const sonde_session_def *session_def, sonde_error *error) {
-  char exams[4096];
+  char exams[4096], own_cases[4096];
   exam_library library = exam_library_find(s->cases, s->protocols);
   const char *named = getenv("SONDE_TRAINEE"), *trainee = s->trainee ? s->trainee : named;
   app_data_home(s->exams, "exams", exams, sizeof exams);
+  app_data_home(s->own_cases, "cases", own_cases, sizeof own_cases);
   exam_app_def def = {.model = model,
                       .model_path = session_def->model_path,
                       .bundled_path = library.has_bundled ? library.bundled : NULL,
                       .cases = library.cases,
+                      .own_cases = own_cases,
                       .protocols = library.protocols,
                       .course = s->course           ? s->course
                                 : library.course[0] ? library.course

@@ -1,4 +1,5 @@
 // Practice, exams and replays behind one page: sessions, phases, requests.
+#include "exam_app_draft.h"
 #include "exam_app_export.h"
 #include "exam_app_lesson.h"
 #include "page_token.h"
@@ -96,7 +97,8 @@ void exam_app_change(exam_app *app, exam *next, exam_replay *replay) {
   pthread_mutex_unlock(&app->lock);
   app->replay = replay;
   exam_film_destroy(app->film);
-  app->film = NULL;
+  exam_draft_destroy(app->draft);
+  app->film = NULL, app->draft = NULL;
   exam_destroy(exam_before);
   exam_replay_destroy(replay_before);
 }
@@ -166,6 +168,7 @@ static sonde_status answer(exam_app *app, const sonde_page_request *request, son
   }
   case SONDE_PAGE_WORKSHEET: return exam_app_write_sheet(app, request->entry, error);
   case SONDE_PAGE_EXPORT: return exam_export_ask(app, request, error);
+  case SONDE_PAGE_EDIT: return exam_edit(app, request->entry, error);
   case SONDE_PAGE_POSITION: return exam_turn(app, request->id, error);
   case SONDE_PAGE_FINISH_EXAM: return exam_finish(app, error);
   case SONDE_PAGE_LEAVE_EXAM: return exam_app_practice(app, error);
@@ -229,12 +232,13 @@ sonde_status exam_app_create(const exam_app_def *def, exam_app **out, sonde_erro
   app->def = *def;
   pthread_mutex_init(&app->lock, NULL);
   snprintf(app->cases, sizeof app->cases, "%s", def->cases);
+  snprintf(app->own_cases, sizeof app->own_cases, "%s", def->own_cases);
   snprintf(app->protocols, sizeof app->protocols, "%s", def->protocols);
   snprintf(app->exams, sizeof app->exams, "%s", def->exams);
   snprintf(app->trainee, sizeof app->trainee, "%s", def->trainee);
   // Cases, protocols, the log, and the probes that a replay shows.
   char path[EXAM_PATH];
-  sonde_status status = sonde_case_list(app->cases, &app->case_list, &app->case_count, error);
+  sonde_status status = exam_app_load_cases(app, error);
   if (!status)
     status =
         sonde_exam_protocol_list(app->protocols, &app->protocol_list, &app->protocol_count, error);
@@ -313,11 +317,12 @@ sonde_status exam_app_destroy(exam_app *app, sonde_error *error) {
   exam_destroy(app->exam);
   exam_replay_destroy(app->replay);
   exam_film_destroy(app->film);
+  exam_draft_destroy(app->draft);
   sonde_course_clear(&app->course);
   sonde_exam_log_close(app->log);
   for (uint32_t i = 0; i < app->probe_count; ++i) sonde_probe_clear(&app->probes[i]);
   free(app->probes);
-  sonde_free(app->case_list);
+  free(app->case_list);
   sonde_free(app->protocol_list);
   pthread_mutex_destroy(&app->lock);
   free(app);

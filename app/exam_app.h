@@ -13,6 +13,7 @@ typedef struct exam_app_def {
   const char *bundled_path; // NULL: model_path
   sonde_site start;         // where the probe of free practice begins
   const char *cases;        // directories
+  const char *own_cases;    // made on the page; created when the first one is kept
   const char *protocols;
   const char *course;         // NULL: none
   const char *exams;          // created when it is missing

@@ -88,7 +88,8 @@ sonde_status exam_choose(const exam_app *app, const sonde_page_request *request,
     const uint64_t seed = (uint64_t)now.tv_sec * 1000 + (uint64_t)now.tv_nsec / 1000000;
     sonde_lesson_patient(of->lesson, seed, &of->patient);
   }
-  for (uint32_t i = 0; i < app->case_count && !practises; ++i) {
+  if (!practises) patient = app->trial;
+  for (uint32_t i = 0; i < app->case_count && !practises && !patient; ++i) {
     char alias[EXAM_ALIAS];
     exam_app_case_alias(app, app->case_list[i].id, alias);
     if (strcmp(alias, request->id) == 0) patient = &app->case_list[i];
@@ -114,7 +115,7 @@ sonde_status exam_start(exam_app *app, const sonde_page_request *request, sonde_
     free(of);
     return status;
   }
-  snprintf(app->trainee, sizeof app->trainee, "%s", of->trainee);
+  if (!app->trial) snprintf(app->trainee, sizeof app->trainee, "%s", of->trainee);
   exam_phase before = app->phase;
   exam_app_set_phase(app, EXAM_PREPARING,
                      "The patient is being prepared: this takes some seconds.");

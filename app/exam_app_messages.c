@@ -1,5 +1,6 @@
 // What the page is told, as JSON: docs/page_protocol.md. Millimetres, degrees and words for people
 // exist only here.
+#include "exam_app_draft.h"
 #include "exam_app_lesson.h"
 
 #include <assert.h>
@@ -99,6 +100,7 @@ void exam_app_tell_greeting(exam_app *app) {
     sonde_json_put_text(&out, "title", c->title);
     sonde_json_put_text(&out, "history", c->history);
     sonde_json_put_text(&out, "level", LEVELS[c->level]);
+    sonde_json_put_bool(&out, "own", i >= app->shipped_count);
     sonde_json_end(&out);
   }
   sonde_json_end(&out);
@@ -210,7 +212,8 @@ static void put_result(sonde_json_out *out, const exam_app *app, const exam *of)
 }
 
 // In the order of exam_phase.
-static const char *const PHASES[] = {"practice", "preparing", "running", "done", "replay", "film"};
+static const char *const PHASES[] = {"practice", "preparing", "running", "done",
+                                     "replay",   "film",      "edit"};
 
 void exam_app_tell_exam(exam_app *app) {
   sonde_json_out out, status;
@@ -357,4 +360,66 @@ void exam_app_tell_replay(exam_app *app) {
   sonde_json_end(&out);
   put_comments(&out, &replay->comments);
   publish(app, SONDE_PAGE_REPLAY, &out);
+}
+
+// ---- editor
+
+void exam_app_tell_draft(exam_app *app) {
+  static const char *const KINDS[] = {"main", "deep", "calf", "superficial"};
+  enum { FIRST_BRANCH = 2 }; // vessels before it: main vein and artery
+  const exam_draft *draft = app->draft;
+  sonde_json_out out;
+  if (!draft || !begin(&out, "draft")) return;
+  sonde_json_put_integer(&out, "serial", draft->serial);
+  sonde_json_put_bool(&out, "good", draft->good);
+  sonde_json_put_bool(&out, "exists", draft->exists);
+  sonde_json_put_text(&out, "message", draft->message);
+  sonde_json_put_text(&out, "saved", draft->saved);
+  if (draft->text) sonde_json_put_text(&out, "text", draft->text);
+  uint32_t count;
+  const sonde_parameter *p = sonde_limb_parameters(&count);
+  sonde_json_begin_list(&out, "parameters");
+  for (uint32_t i = 0; i < count; ++i) {
+    sonde_json_begin_object(&out, NULL);
+    sonde_json_put_text(&out, "key", p[i].name);
+    sonde_json_put_text(&out, "text", p[i].text);
+    put_rounded(&out, "low", p[i].low / p[i].unit, 0.01);
+    put_rounded(&out, "high", p[i].high / p[i].unit, 0.01);
+    sonde_json_end(&out);
+  }
+  sonde_json_end(&out);
+  // Of a leg in view: segments and vessels; without one the map is empty.
+  const sonde_vein_map *map = &draft->setup.map;
+  sonde_json_put_real(&out, "vein_mm", 1e3 * map->length_m, 0);
+  sonde_json_begin_list(&out, "segments");
+  for (uint32_t i = 0; i < map->segment_count; ++i) {
+    const sonde_exam_segment *s = &map->segment[i];
+    sonde_json_begin_object(&out, NULL);
+    sonde_json_put_text(&out, "id", s->name);
+    sonde_json_put_text(&out, "title", sonde_segment_title(s->name));
+    sonde_json_put_text(&out, "kind", KINDS[s->kind]);
+    if (s->kind == SONDE_SEGMENT_MAIN) {
+      const double ends[2] = {sonde_vein_along(map, s->from_m), sonde_vein_along(map, s->to_m)};
+      put_reals(&out, "along_mm", (double[]){1e3 * ends[0], 1e3 * ends[1]}, 2);
+    }
+    sonde_json_begin_list(&out, "branches");
+    for (uint32_t k = 0; k < s->vein_count; ++k) {
+      assert(s->vein[k] >= FIRST_BRANCH && s->vein[k] - FIRST_BRANCH < map->branch_count);
+      sonde_json_put_text(&out, NULL, map->branch[s->vein[k] - FIRST_BRANCH]);
+    }
+    sonde_json_end(&out);
+    sonde_json_end(&out);
+  }
+  sonde_json_end(&out);
+  sonde_json_begin_list(&out, "branches");
+  for (uint32_t i = 0; i < map->branch_count; ++i) sonde_json_put_text(&out, NULL, map->branch[i]);
+  sonde_json_end(&out);
+  const sonde_model *model = draft->setup.model;
+  assert(!model || !model->anatomy || model->anatomy->branch_count == map->branch_count);
+  sonde_json_begin_list(&out, "veins");
+  for (uint32_t i = 0; model && model->anatomy && i < map->branch_count; ++i)
+    if (model->anatomy->branch[i].kind == SONDE_VESSEL_VEIN)
+      sonde_json_put_text(&out, NULL, map->branch[i]);
+  sonde_json_end(&out);
+  publish(app, SONDE_PAGE_DRAFT, &out);
 }

@@ -9,6 +9,7 @@
 
 typedef struct exam_film exam_film;     // exam_app_lesson.h
 typedef struct exam_export exam_export; // exam_app_export.h
+typedef struct exam_draft exam_draft;   // exam_app_draft.h
 
 enum {
   EXAM_PATH = 4096,
@@ -27,7 +28,8 @@ typedef enum exam_phase {
   EXAM_RUNNING,
   EXAM_DONE,
   EXAM_REPLAY,
-  EXAM_FILM
+  EXAM_FILM,
+  EXAM_EDIT
 } exam_phase;
 
 // Picture at half the image's size; the vein's ratio in it.
@@ -117,9 +119,9 @@ typedef struct exam_replay {
 
 struct exam_app {
   exam_app_def def;
-  char cases[EXAM_PATH], protocols[EXAM_PATH], exams[EXAM_PATH], trainee[164];
-  sonde_case *case_list;
-  uint32_t case_count;
+  char cases[EXAM_PATH], own_cases[EXAM_PATH], protocols[EXAM_PATH], exams[EXAM_PATH], trainee[164];
+  sonde_case *case_list; // [case_count] those that ship, then the user's own
+  uint32_t case_count, shipped_count;
   sonde_exam_protocol *protocol_list;
   uint32_t protocol_count;
   sonde_probe *probes; // [probe_count] that a replay shows
@@ -129,10 +131,12 @@ struct exam_app {
   sonde_session *session; // practice or exam; NULL in a replay
   exam_phase phase;       // under the lock when changed
   char message[EXAM_SENTENCE];
-  exam *exam;          // NULL: none
-  exam_replay *replay; // NULL: none
-  exam_film *film;     // NULL: none
-  exam_export *export; // NULL: none
+  exam *exam;              // NULL: none
+  exam_replay *replay;     // NULL: none
+  exam_film *film;         // NULL: none
+  exam_export *export;     // NULL: none
+  exam_draft *draft;       // NULL: none
+  const sonde_case *trial; // that the next exam is about, whatever the page says; NULL: none
   sonde_course course;
   double published_s;
   bool disk_told; // that the disk does not take the recording

@@ -1,6 +1,6 @@
 // Bundles the page and the reports into dist/ (or the directory given as the first argument): index.html,
-// style.css, app.js and report.html, and each of them as .gz for embedding. The licences of three.js and
-// uPlot stay at the end of the scripts that hold them.
+// style.css, app.js and report.html, and each of them as .gz for embedding. The licences of three.js,
+// uPlot and js-yaml stay at the end of the scripts that hold them.
 import { build } from "esbuild";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { gzipSync } from "node:zlib";
@@ -26,7 +26,7 @@ const bundle = (entry, outfile) =>
 
 // One licence text per bundled library, whatever the minifier kept of the comments.
 async function licences(inputs) {
-  const held = ["three", "uplot"].filter((name) => Object.keys(inputs).some((file) => file.includes(`node_modules/${name}/`)));
+  const held = ["three", "uplot", "js-yaml"].filter((name) => Object.keys(inputs).some((file) => file.includes(`node_modules/${name}/`)));
   const texts = await Promise.all(held.map(async (name) => `/*! ${name}\n${await read(`node_modules/${name}/LICENSE`)}*/\n`));
   return texts.join("");
 }

@@ -17,7 +17,7 @@ enum {
   SONDE_PAGE_TOKEN = 33,   /**< bytes of a token with its end: 128 bits in hexadecimal */
   SONDE_PAGE_ADDRESS = 64, /**< bytes of a page's address with its end */
   SONDE_PAGE_LINK = 208,   /**< bytes of a link with its end */
-  SONDE_PAGE_ENTRY = 4097  /**< bytes of an entry with its end */
+  SONDE_PAGE_ENTRY = 12289 /**< bytes of an entry with its end */
 };
 
 /** A new token from the kernel's random numbers. @return IO when there are none @thread any */
@@ -43,6 +43,7 @@ typedef enum sonde_page_ask {
   SONDE_PAGE_DEMONSTRATE,  /**< id (lesson) */
   SONDE_PAGE_NEXT,         /**< of a demonstration: its words are read */
   SONDE_PAGE_EXPORT,       /**< id (exam), text (what, may be empty), turn (part, from 1) */
+  SONDE_PAGE_EDIT,         /**< entry, of a client with the teacher's token only */
   SONDE_PAGE_ASKS
 } sonde_page_ask;
 
@@ -65,6 +66,7 @@ typedef enum sonde_page_topic {
   SONDE_PAGE_REPLAY,
   SONDE_PAGE_SHEET,  /**< the worksheet of the exam */
   SONDE_PAGE_FILES,  /**< what can be downloaded of a kept exam */
+  SONDE_PAGE_DRAFT,  /**< of the case that is edited: to teachers only */
   SONDE_PAGE_STATUS, /**< not sent: GET /status.json */
   SONDE_PAGE_TOPICS
 } sonde_page_topic;
@@ -79,7 +81,8 @@ typedef struct sonde_page_def {
   double force_limit_n;        /**< shown on the page; 0: sonde_safety_limits_default() */
   const char *exams_directory; /**< with ID/report.html, exam.json, ...; NULL: none */
   void *user;                  /**< for the function below, which may be NULL */
-  /** A request of the client that controls; a comment or the list of exams, of any. Called by one
+  /** A request of the client that controls; a comment or the list of exams, of any; an edit, of a
+   *  teacher. Called by one
    *  thread at a time while the server's clients wait: copy it and return; call nothing of this
    *  header from it. */
   void (*request)(void *user, const sonde_page_request *request);

@@ -194,6 +194,7 @@ static int run(void) {
   exam_app_def def = {.model = model,
                       .model_path = setting("EXAM_ONCE_MODEL"),
                       .cases = setting("EXAM_ONCE_CASES"),
+                      .own_cases = "none",
                       .protocols = setting("EXAM_ONCE_PROTOCOLS"),
                       .course = getenv("EXAM_ONCE_COURSE"),
                       .exams = setting("EXAM_ONCE_DIR"),

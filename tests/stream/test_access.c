@@ -49,12 +49,13 @@ static void a_long_frame_is_refused_by_its_head(void **state) {
   }
 }
 
-// The longest message that is allowed comes in small pieces, and more than one in a piece.
+// The longest message of its kind that is allowed comes in small pieces, and more than one in a
+// piece.
 static void a_message_may_come_in_any_pieces(void **state) {
   fixture *f = *state;
-  static char text[PAGE_COMMAND_BYTES];
-  unsigned char frame[PAGE_COMMAND_BYTES + 8] = {0x81, 0xfe, PAGE_COMMAND_BYTES >> 8,
-                                                 PAGE_COMMAND_BYTES & 0xff}; // mask 0
+  static char text[PAGE_SHORT_BYTES];
+  unsigned char frame[PAGE_SHORT_BYTES + 8] = {0x81, 0xfe, PAGE_SHORT_BYTES >> 8,
+                                               PAGE_SHORT_BYTES & 0xff}; // mask 0
   memset(text, ' ', sizeof text);
   memcpy(text, "{\"type\":\"ping\",\"id\":7}", 22);
   memcpy(frame + 8, text, sizeof text);

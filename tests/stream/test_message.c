@@ -430,7 +430,12 @@ static void size_zero_bytes_and_depth_are_bounded(void **state) {
   static char big[PAGE_COMMAND_BYTES + 2];
   memset(big, ' ', sizeof big);
   memcpy(big, "{\"type\":\"stop\"}", 15);
+  assert_int_equal(page_parse_command(big, PAGE_SHORT_BYTES, &c, &error), SONDE_OK);
+  assert_int_equal(page_parse_command(big, PAGE_SHORT_BYTES + 1, &c, &error), SONDE_FORMAT);
+  // Only a case that is edited may be longer.
+  memcpy(big, "{\"type\":\"edit\"}", 15);
   assert_int_equal(page_parse_command(big, PAGE_COMMAND_BYTES, &c, &error), SONDE_OK);
+  assert_int_equal(strlen(c.request.entry), PAGE_COMMAND_BYTES);
   assert_int_equal(page_parse_command(big, PAGE_COMMAND_BYTES + 1, &c, &error), SONDE_FORMAT);
   assert_int_equal(page_parse_command("{\"type\":\"stop\"}\0", 16, &c, &error), SONDE_FORMAT);
   memset(big, '[', PAGE_COMMAND_BYTES);

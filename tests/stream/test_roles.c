@@ -1,5 +1,5 @@
 // Learner, watcher and teacher: who controls, who may take, give and return control, who may
-// comment.
+// comment, who edits cases.
 #include "stream/page_fixture.h"
 
 static const char ANNA[] = "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa";
@@ -182,6 +182,59 @@ static void a_watcher_comments_and_does_nothing_else(void **state) {
   close(bo);
 }
 
+// An edit of `size` bytes, filled with blanks.
+static void say_edit(int s, size_t size) {
+  static char text[PAGE_COMMAND_BYTES + 1];
+  memset(text, ' ', sizeof text);
+  memcpy(text, "{\"type\":\"edit\"}", 15);
+  ws_send_frame(s, 0x81, text, size);
+}
+
+// Whether a draft is among the messages before the answer to a ping, which what is published
+// precedes.
+static bool hears_the_draft(int s) {
+  bool draft = false;
+  ws_say(s, "{\"type\":\"ping\",\"id\":8}");
+  for (bool answered = false; !answered;) {
+    int opcode;
+    size_t count;
+    char *data = (char *)ws_read(s, &opcode, &count);
+    assert_true(data && opcode != 8);
+    draft |= opcode == 1 && strstr(data, "\"type\":\"draft\"") != NULL;
+    answered = opcode == 1 && strcmp(data, "{\"type\":\"pong\",\"id\":8}") == 0;
+    free(data);
+  }
+  return draft;
+}
+
+// A case holds the answer of an exam. It is also the only message that may be long.
+static void only_a_teacher_edits_cases(void **state) {
+  fixture *f = *state;
+  sonde_page_publish(f->server, SONDE_PAGE_DRAFT, "{\"type\":\"draft\"}", NULL);
+  static const char *const OTHERS[] = {WS_TOKEN, WS_GUEST};
+  for (size_t i = 0; i < SONDE_COUNT_OF(OTHERS); ++i) {
+    int s = visit(f, ANNA, OTHERS[i]);
+    assert_false(hears_the_draft(s));
+    say_edit(s, PAGE_SHORT_BYTES);
+    assert_true(ws_expect(s, "teacher's address"));
+    say_edit(s, PAGE_SHORT_BYTES + 1);
+    assert_int_equal(ws_close_status(s), PAGE_CLOSE_TOO_BIG);
+    close(s);
+  }
+  assert_int_equal(atomic_load(&f->requests), 0);
+  int anna = visit(f, ANNA, WS_TOKEN), teacher = visit(f, BO, f->server->teacher_token);
+  assert_true(told(anna, true, "learner", "learner", "")); // the teacher need not control
+  assert_true(hears_the_draft(teacher));
+  say_edit(teacher, PAGE_COMMAND_BYTES);
+  assert_true(reaches(&f->requests, 1));
+  assert_int_equal(f->request.ask, SONDE_PAGE_EDIT);
+  assert_int_equal(strlen(f->request.entry), PAGE_COMMAND_BYTES);
+  say_edit(teacher, PAGE_COMMAND_BYTES + 1);
+  assert_int_equal(ws_close_status(teacher), PAGE_CLOSE_TOO_BIG);
+  close(teacher);
+  close(anna);
+}
+
 static void who_may_only_watch_takes_nobodys_place(void **state) {
   fixture *f = *state;
   int guest[PAGE_GUESTS], here[PAGE_CLIENTS - PAGE_GUESTS];
@@ -211,6 +264,7 @@ int main(void) {
       SERVER_TEST(a_teacher_takes_control_and_gives_it_back),
       SERVER_TEST(a_learner_lends_control_and_takes_it_back),
       SERVER_TEST(a_watcher_comments_and_does_nothing_else),
+      SERVER_TEST(only_a_teacher_edits_cases),
       SERVER_TEST(who_may_only_watch_takes_nobodys_place),
   };
   return cmocka_run_group_tests(tests, start_server, stop_server);

@@ -20,10 +20,10 @@ export const FEW_IMAGES = ["--images-hz", "4"];
 /**
  * `sonde run` with these arguments, once it has printed the learner's and the teacher's address:
  * {child, learner, teacher, ended, interrupt}. `ended` gives the signal or the exit code. The program
- * dies with this process.
+ * dies with this process. `more`: variables of its environment.
  */
-export function startRun(sonde, args) {
-  const child = spawn(sonde, ["run", ...args], { stdio: ["ignore", "pipe", "inherit"] });
+export function startRun(sonde, args, more = {}) {
+  const child = spawn(sonde, ["run", ...args], { stdio: ["ignore", "pipe", "inherit"], env: { ...process.env, ...more } });
   process.on("exit", () => child.kill("SIGKILL"));
   const ended = new Promise((done) => child.on("exit", (code, signal) => done(signal ?? code)));
   let interrupted = false; // a second SIGINT would end the program at once

@@ -8,7 +8,8 @@ function masked(text) {
   const data = Buffer.from(text);
   const mask = randomBytes(4);
   const body = data.map((byte, i) => byte ^ mask[i % 4]);
-  return Buffer.concat([Buffer.from([0x81, 0x80 | data.length]), mask, body]);
+  const size = data.length < 126 ? [0x80 | data.length] : [0x80 | 126, data.length >> 8, data.length & 0xff];
+  return Buffer.concat([Buffer.from([0x81, ...size]), mask, body]);
 }
 
 /** One whole message of the program at the start of the bytes, or null. */
@@ -59,6 +60,7 @@ export class Client {
     for (let m = message(rest); m; m = message(rest)) {
       rest = rest.subarray(m.end);
       if (m.opcode === 1) this.heard?.(JSON.parse(m.data.toString()));
+      if (m.opcode === 8) this.ended?.(m.data.readUInt16BE(0));
       if (m.opcode === 2 && m.data.readUInt16LE(6) === FRAME) this.acknowledge(m.data.readUInt32LE(8));
     }
     this.parts = [rest];
@@ -70,6 +72,11 @@ export class Client {
     this.sequences.push(sequence);
     this.socket.write(masked(JSON.stringify({ type: "ack", frame: sequence })));
     this.woken?.();
+  }
+
+  /** A message to the program, shorter than 64 KiB. */
+  say(message) {
+    this.socket.write(masked(JSON.stringify(message)));
   }
 
   /** Resolves once so many more frames have come. */

@@ -5,7 +5,7 @@ import { join } from "node:path";
 
 /** Sources whose sentences reach the page, and those whose errors do. */
 const SOURCES = ["judge_guide.c", "picture.c", "score.c", "score_explain.c", "worksheet_judge.c", "vein_map.c", "case_draw.c"].map((f) => `src/sonde-exam/trainer/${f}`)
-  .concat(["src/sonde/haptics/safety.c", "app/exam_app.c", "app/exam_app_exam.c", "app/exam_app_export.c", "app/exam_app_film.c", "app/exam_app_files.c", "app/exam_app_replay.c", "app/exam_app_sheet.c"]);
+  .concat(["src/sonde/haptics/safety.c", "app/exam_app.c", "app/exam_app_draft.c", "app/exam_app_edit.c", "app/exam_app_exam.c", "app/exam_app_export.c", "app/exam_app_film.c", "app/exam_app_files.c", "app/exam_app_replay.c", "app/exam_app_sheet.c"]);
 /** Calls whose texts never reach a reader: failures of files, members of JSON, checks. */
 const UNSEEN = /\b(sonde_fail|sonde_reader_fail|refuse|SONDE_ASSERT|_Static_assert|sonde_json_\w+|fprintf|printf|strcmp|strncmp|sonde_file_\w+|fopen|strstr|sonde_reader_\w+|sonde_path_\w+|sonde_disk_\w+|offset_of|memcmp|sonde_pathology_preset)\s*\(/g;
 
@@ -72,6 +72,11 @@ const JOINED = {
   "there is no {one} of that name": ["there is no case of that name", "there is no protocol of that name"],
   "common femoral": [],
   "unknown fault": [],
+  "Synthetic limb of a training case": [],
+  "Leg of a case": [], // the page has words of its own for it
+  "there are too many of one's own": [], // on the terminal
+  "a case of one's own has no model file": [],
+  "another case has its id": [],
   Worksheet: [],
   Guest: [],
 };
@@ -92,6 +97,7 @@ function vessels(file, text) {
 export function spoken(source) {
   const at = (file) => [file, readFileSync(join(source, file), "utf8")];
   const all = SOURCES.flatMap((file) => sentences(file, readFileSync(join(source, file), "utf8")));
+  all.push(...listed(...at("include/sonde/limb.h"), "SONDE_LIMB_LIST").filter((_row, i) => i % 2 === 1)); // each row: key, text
   all.push(...PIECES.map((word) => [word, "src/sonde-exam/trainer"]));
   all.push(...listed(...at("include/sonde/trainer_judge.h"), "SONDE_SCORE_LIST"), ...listed(...at("include/sonde/haptics.h"), "SONDE_FAULT_LIST"));
   all.push(...[.../POSITION_TITLES\[\] = \{([^}]*)\}/.exec(at("src/sonde-exam/trainer/case_read.c")[1])[1].matchAll(/"([^"]*)"/g)].map((m) => [m[1], "src/sonde-exam/trainer/case_read.c"]));

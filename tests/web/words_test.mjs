@@ -28,7 +28,7 @@ const places = (text) => [...text.matchAll(/\{(\w+)\}/g)].map((m) => m[1]).sort(
 /** Words that are the same in both languages, keys of the keyboard, signs, units. */
 const SAME = /^[^A-Za-z]*$|^(\{\w+\}|[^A-Za-z{}]|\b(mm|cm|s|ms|N|ml|dB|Hz|MHz|min|TGC|C|F|M|O|B|P|V|Z|J|K|L|N|U|I|Esc|Q|E|T|G|Y|H|A|D|W|S|R)\b)*$/;
 const ALIKE = {
-  de: /^(page\.(power|stop|patient|gel_put|doppler)|film\.pause|gel\.ml|name\.linear|course\.patient|gate\.filter|sheet\.(reflux|patient|side\.l|side\.r)|sheet\.reflux\.present|sheet\.score_of|report\.(minutes)|exam\.said)$/,
+  de: /^(page\.(power|stop|patient|gel_put|doppler)|film\.pause|gel\.ml|name\.linear|course\.patient|gate\.filter|sheet\.(reflux|patient|side\.l|side\.r)|sheet\.reflux\.present|sheet\.score_of|report\.(minutes)|exam\.said|editor\.part\.text)$/,
   fr: /^(page\.(distance|measure_distance|patient|probe|position|gel_put|force|doppler)|film\.pause|gel\.ml|slider\.gain|sheet\.(reflux|note|impression|conclusion|patient|head\.compression)|sheet\.reflux\.present|course\.(patient|questions)|finding\.compressible|sheet\.finding\.compressible|duplex\.gain|duplex\.steer|gate\.(angle|base|gain|beam)|spectrum\.angle|result\.(compressions|segment|points)|history\.(date)|report\.(date|minutes|verdict|decision\.compressible|draw\.(force|minutes))|sheet\.(question|date)|exam\.said|name\.(healthy)|tissue\.friction|report\.force_n|force\.newtons|course\.points|caliper\.second|class\.(force|score|discrimination|date))$/,
 };
 for (const [language, words] of Object.entries(others)) {

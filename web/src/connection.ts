@@ -141,6 +141,9 @@ export class Connection {
   comment(time_s: number, text: string, author: string): void {
     this.send({ type: "comment", time_s, text, author });
   }
+  edit(message: object): void {
+    this.send({ type: "edit", ...message });
+  }
   worksheet(entry: object): void {
     this.send({ type: "worksheet", ...entry });
   }

@@ -17,6 +17,8 @@ export interface FlatVessel {
   /** x, y, z, radius */
   points: Float32Array;
   vein: boolean;
+  /** a clot that is being placed */
+  marked?: boolean;
 }
 
 /** What there is to see. */
@@ -115,7 +117,7 @@ export class FlatView {
     if (closed) this.c.closePath();
   }
 
-  private vessel({ points, vein }: FlatVessel): void {
+  private vessel({ points, vein, marked }: FlatVessel): void {
     const middle: Point[] = [];
     let radius_mm = 0;
     for (let i = 0; i < points.length; i += 4) {
@@ -126,7 +128,7 @@ export class FlatView {
     const c = this.c;
     const [a, b] = [middle[0]!, middle[middle.length - 1]!];
     const length_mm = Math.hypot(points[points.length - 4]! - points[0]!, points[points.length - 3]! - points[1]!, points[points.length - 2]! - points[2]!);
-    c.strokeStyle = vein ? ink("leg-vein") : ink("leg-artery");
+    c.strokeStyle = ink(marked ? "leg-clot" : vein ? "leg-vein" : "leg-artery");
     c.globalAlpha = 0.85;
     c.lineCap = c.lineJoin = "round";
     c.lineWidth = Math.max(2, (2 * radius_mm * Math.hypot(b[0] - a[0], b[1] - a[1])) / Math.max(1, length_mm));

@@ -8,6 +8,7 @@ import { announce, find, label, minutes, press, pressed, recall, release, rememb
 import { Duplex } from "./duplex";
 import { EchoView } from "./echo";
 import { FilmBar } from "./film";
+import { Editor } from "./editor";
 import { ExamBar } from "./exam";
 import { ForceBar } from "./force_bar";
 import { GateTools } from "./gate";
@@ -83,6 +84,7 @@ class App {
   private readonly result: ResultDialog;
   private readonly exports: ExportDialog;
   private readonly history: HistoryDialog;
+  readonly editor: Editor;
   private readonly coach = new Coach();
   private readonly rates = new Rates();
   private readonly input: Input;
@@ -153,6 +155,11 @@ class App {
     });
     this.exports = new ExportDialog({ ask: (exam, what, part) => connection.exportExam(exam, what, part) });
     this.history = new HistoryDialog((exam) => connection.openReplay(exam), (exam) => this.exports.open(exam));
+    this.editor = new Editor(this.scene, {
+      send: (message) => connection.edit(message),
+      control: () => this.controls?.may === "take" && connection.role("take"),
+      changed: () => this.showMode(),
+    });
     this.input = this.wireInput();
     this.wireButtons();
     startTheme();
@@ -171,7 +178,7 @@ class App {
       freeze: () => this.tools.freeze(),
       seeThrough: () => this.toggleThrough(),
       reset: () => this.reset(),
-      stop: () => this.connection.stop(),
+      stop: () => void (this.editor.escape() || this.connection.stop()),
       help: () => find<HTMLDialogElement>("help").showModal(),
       sites: () => (this.phase === "practice" ? (this.hello?.sites ?? []) : []),
       key: (code, shift) => this.key(code, shift),
@@ -227,6 +234,7 @@ class App {
     else if (message.type === "export") this.exports.fill(message);
     else if (message.type === "replay") this.setReplay(message);
     else if (message.type === "worksheet") this.setSheet(message);
+    else if (message.type === "draft") this.editor.hear(message);
     else if (message.type === "error") this.say(message.message);
   }
 
@@ -242,6 +250,7 @@ class App {
     this.scene.setLimb(hello.limb ?? null);
     find("leg-name").textContent = hello.limb ? limbWords(hello.limb) : "";
     this.start.greet(hello);
+    this.editor.greet(hello);
     this.forceBar.limits(hello.force_limit_n, hello.comfort_n ?? COMFORT * hello.force_limit_n);
     find("start-button").hidden = find("exams-button").hidden = !hello.trainer;
     find("course-button").hidden = !this.start.course.any;
@@ -265,6 +274,7 @@ class App {
     this.duplex.set(controls);
     this.gateTools.set(controls);
     this.spectrum.set(controls);
+    this.editor.set(controls);
     this.scene.setGel((controls.gel_ml ?? 0) > 0.05);
     if (probeChanged) this.plot.clear();
     this.curveKey = "";
@@ -321,6 +331,8 @@ class App {
     else this.result.hide();
     if (exam.phase !== "replay") this.replayBar.leave();
     this.guide(exam);
+    if (exam.phase === "edit") this.still();
+    this.editor.follow(exam.phase);
     this.showMode();
     this.offerStart();
   }
@@ -377,11 +389,19 @@ class App {
     if (!connected) this.live(false);
     find<HTMLButtonElement>("stop").disabled = !connected;
     find("status").classList.toggle("off", !connected);
-    if (connected) find("banner").hidden = true;
-    else {
+    if (connected) {
+      find("banner").hidden = true;
+      this.editor?.again();
+    } else {
       this.lost = true;
       this.say(t(this.phase === "running" ? "main.lost_exam" : "main.lost", { seconds: shown(wait_s, 1) }), 0);
     }
+  }
+
+  /** A leg without images is looked at as well. */
+  private still(): void {
+    this.imaged = true;
+    this.live(true);
   }
 
   private isLive = false;
@@ -416,7 +436,7 @@ class App {
   /** This page's hand moves the probe: not when watching, with another device, or in a replay. */
   private get hands(): boolean {
     const device = this.hello?.device ?? "page";
-    return this.isLive && (this.controls?.controls ?? false) && device === "page" && this.phase !== "replay" && this.phase !== "film" && this.phase !== "preparing";
+    return this.isLive && (this.controls?.controls ?? false) && device === "page" && this.phase !== "replay" && this.phase !== "film" && this.phase !== "preparing" && this.phase !== "edit" && !this.editor?.isOpen;
   }
 
   private showMode(): void {
@@ -425,7 +445,8 @@ class App {
     const judged = phase === "running" || phase === "preparing"; // nothing may tell the truth
     const guidance = this.exam?.guidance ?? "full";
     document.body.dataset.phase = phase;
-    find("practice-bar").hidden = examining || phase === "replay" || phase === "film";
+    find("practice-bar").hidden = examining || phase === "replay" || phase === "film" || phase === "edit";
+    find("edit-note").hidden = phase !== "edit";
     find("film-bar").hidden = phase !== "film";
     find("exam-bar").hidden = !examining;
     find("replay-bar").hidden = phase !== "replay";
@@ -436,7 +457,7 @@ class App {
     this.preparing();
     const bare = judged && guidance === "exam";
     find<HTMLButtonElement>("see-through").disabled = bare;
-    this.applyThrough(this.through && !bare);
+    this.applyThrough((this.through || (this.editor?.isOpen ?? false)) && !bare); // in the editor veins are pointed at
     this.scene.showSites(phase === "practice");
     this.echo.tellCase(phase === "practice");
     this.readouts.showVessels(!judged || guidance === "full");
@@ -455,8 +476,9 @@ class App {
     const own = exam !== null && phase !== "practice" && exam.title !== "";
     const played = phase === "replay" ? (this.replay?.title ?? "") : "";
     const shown = phase === "film" ? this.hello?.course?.find((l) => l.id === exam?.lesson?.id) : undefined;
-    find("case-title").textContent = own ? exam.title : shown?.title || played || label(this.hello?.model ?? "");
-    find("case-history").textContent = own ? exam.history : shown ? shown.patient : played ? "" : t("main.practise_on");
+    const written = phase === "edit";
+    find("case-title").textContent = written ? t("editor.label") : own ? exam.title : shown?.title || played || label(this.hello?.model ?? "");
+    find("case-history").textContent = written ? t("page.edit_note") : own ? exam.history : shown ? shown.patient : played ? "" : t("main.practise_on");
     find("case").title = find("case-history").textContent ?? "";
     this.showRole();
     const device = this.hello?.device ?? "page";
@@ -602,7 +624,7 @@ class App {
     if (frame) this.show(frame);
     if (frame) this.connection.ack(frame.sequence); // before the leg: image and force do not wait for it
     if (this.imaged) this.scene.render(now_s); // its first picture takes long: the image goes before it
-    this.imaged = this.frames > 0;
+    this.imaged ||= this.frames > 0;
     this.nameTarget();
     this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms);
   }
@@ -692,6 +714,8 @@ const sonde = {
   get depth() { return app.hold.depth_mm; },
   /** where the hand holds the probe on the resting skin */
   get point() { return app.hold.point; },
+  get draft() { return app.editor.told; },
+  vesselOnScreen: (part: number, share: number) => app.scene.vesselOnScreen(part, share),
   /** middle of the wanted ring on the canvas, px */
   targetOnScreen: () => app.scene.targetOnScreen("middle"),
   setDepth: (depth_mm: number) => app.setDepth(depth_mm),

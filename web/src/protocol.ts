@@ -1,6 +1,7 @@
 // Messages of docs/page_protocol.md: types, decoding of the binary ones. Lengths are mm.
 
 import type { ExportMessage } from "./exports";
+import type { DraftMessage } from "./draft";
 import { type Face, FLAT } from "./lines";
 import type { SheetMessage } from "./worksheet";
 
@@ -72,6 +73,8 @@ export interface CaseInfo {
   title: string;
   history: string;
   level: "first" | "easy" | "hard";
+  /** one of those that the user wrote */
+  own?: boolean;
 }
 
 export interface ProtocolInfo {
@@ -138,7 +141,7 @@ export type Posture = "supine" | "sitting" | "standing";
 export type Guidance = "full" | "hints" | "exam";
 export type Decision = "" | "compressible" | "clot" | "not_seen";
 export type PressResult = "complete" | "open" | "too_hard" | "off_axis" | "insufficient";
-export type Phase = "practice" | "preparing" | "running" | "done" | "replay" | "film";
+export type Phase = "practice" | "preparing" | "running" | "done" | "replay" | "film" | "edit";
 
 export interface Target {
   name: string;
@@ -355,6 +358,7 @@ export type TextMessage =
   | Replay
   | SheetMessage
   | ExportMessage
+  | DraftMessage
   | { type: "exams"; list: ExamEntry[] }
   | { type: "error"; message: string }
   | { type: "pong"; id: number };

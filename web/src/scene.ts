@@ -7,6 +7,7 @@ import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.j
 import { find } from "./dom";
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
 import { FlatView, movedShare, type FlatVessel } from "./flat";
+import { nearestShare, stretch } from "./vessels";
 import { Gel } from "./gel";
 import { Foot } from "./limb";
 import { Skin } from "./pose";
@@ -28,6 +29,7 @@ const CREASE_RAD = 0.6; // sharper edges are drawn sharp
 const SEEN_COSINE = 0.4; // between the view and the normal of a place: less is on the far side
 const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.9; // of the leg's length: what the camera looks at, and from how far
 const FARTHEST_MM = 2000; // of the camera from the leg
+const MARK_SCALE = 1.35; // of a marked stretch against its vessel
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
 /** Skin: vertex colours with alpha; more opaque where it is seen at a grazing angle, like glass; where
@@ -85,6 +87,19 @@ function hasMoved(before: Frame, now: Frame): boolean {
   return now.displacements.some((d, i) => Math.abs(d * now.quantum_mm - before.displacements[i]! * before.quantum_mm) > STILL_MM);
 }
 
+/** A place on a vessel: its part of the geometry and the share of its length. */
+export interface VesselPoint {
+  part: number;
+  share: number;
+}
+
+/** A stretch of a vessel that is made visible. */
+export interface VesselMark {
+  part: number;
+  from: number;
+  to: number;
+}
+
 interface SiteDot {
   node: number;
   rest: THREE.Vector3;
@@ -127,6 +142,8 @@ export class LegScene {
   private drawn_s = -Infinity;
   private flat: FlatView | null = null; // draws while there is no WebGL
   private readonly vessels = new Map<number, FlatVessel>();
+  private readonly marked = new THREE.Group();
+  private marks: readonly VesselMark[] = [];
   private sites: readonly Site[] = [];
   private frame: Frame | null = null;
   private placed: Frame | null = null; // that skin and probe were last drawn at
@@ -154,7 +171,7 @@ export class LegScene {
     this.plane.renderOrder = 2.5; // after the skin, so that it shows through at full brightness
     this.plane.rotation.set(Math.PI / 2, 0, 0);
     this.probe.add(this.plane);
-    this.scene.add(this.inside, this.probe, this.ring, this.target.group, this.sides.group, this.foot.group, this.lights);
+    this.scene.add(this.inside, this.probe, this.ring, this.target.group, this.marked, this.sides.group, this.foot.group, this.lights);
     this.addLights();
     this.camera.up.set(0, 1, 0);
     this.orbit = new OrbitControls(this.camera, canvas);
@@ -345,6 +362,7 @@ export class LegScene {
     const colour = vein ? SOLID.vein : SOLID.artery;
     const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.55, emissive: colour, emissiveIntensity: 0.25 });
     this.replaceInside(`vessel ${line.part}`, new THREE.Mesh(tube, material));
+    if (this.marks.some((m) => m.part === line.part)) this.markVessels(this.marks);
   }
 
   private setProbeBody(mesh: Mesh): void {
@@ -544,6 +562,57 @@ export class LegScene {
     this.plane.position.set(0, 0, frame.face.top_mm + frame.height_mm / 2);
   }
 
+  /** The wanted vessel that is nearest to the pointer, at most `near_px` away, and where on it. */
+  vesselAt(clientX: number, clientY: number, near_px: number, wanted: (part: number) => boolean): VesselPoint | null {
+    const box = this.canvas.getBoundingClientRect();
+    this.camera.updateMatrixWorld();
+    const p = new THREE.Vector3();
+    const at = (x: number, y: number, z: number): [number, number] => {
+      p.set(x, y, z).project(this.camera);
+      return [box.left + ((p.x + 1) / 2) * box.width, box.top + ((1 - p.y) / 2) * box.height];
+    };
+    let best: (VesselPoint & { away_px: number }) | null = null;
+    for (const [part, { points }] of this.vessels) {
+      if (!wanted(part)) continue;
+      const { share, away_px } = nearestShare(points, at, clientX, clientY);
+      if (away_px < near_px && (!best || away_px < best.away_px)) best = { part, share, away_px };
+    }
+    return best && { part: best.part, share: best.share };
+  }
+
+  /** Where a place on a vessel is on the canvas, px. */
+  vesselOnScreen(part: number, share: number): [number, number] | null {
+    const line = this.vessels.get(part);
+    const piece = line && stretch(line.points, share, share + 1e-4);
+    if (!piece?.length) return null;
+    this.camera.updateMatrixWorld();
+    const q = new THREE.Vector3(piece[0], piece[1], piece[2]).project(this.camera);
+    return [((q.x + 1) / 2) * this.canvas.clientWidth, ((1 - q.y) / 2) * this.canvas.clientHeight];
+  }
+
+  /** Draws stretches of vessels thicker, for clots that are being placed. */
+  markVessels(marks: readonly VesselMark[]): void {
+    this.marks = marks;
+    for (const old of this.marked.children) (old as THREE.Mesh).geometry.dispose();
+    this.marked.clear();
+    for (const { points } of this.markedLines()) {
+      const course = Array.from({ length: points.length / 4 }, (_, i) => new THREE.Vector3(points[4 * i], points[4 * i + 1], points[4 * i + 2]));
+      const tube = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(course), 8 * course.length, MARK_SCALE * Math.max(1.5, points[3]!), 10);
+      const mesh = new THREE.Mesh(tube, new THREE.MeshBasicMaterial({ color: SOLID.clot, depthTest: false, transparent: true, opacity: 0.9 }));
+      mesh.renderOrder = 5;
+      this.marked.add(mesh);
+    }
+    this.dirty = true;
+  }
+
+  private markedLines(): FlatVessel[] {
+    return this.marks.flatMap(({ part, from, to }) => {
+      const line = this.vessels.get(part);
+      const points = line ? stretch(line.points, from, to) : new Float32Array(0);
+      return points.length >= 8 ? [{ points, vein: true, marked: true }] : [];
+    });
+  }
+
   // ---- pointing --------------------------------------------------------------------------------
 
   /** Point of the resting skin under the pointer. */
@@ -614,7 +683,7 @@ export class LegScene {
     const drawn = flat.draw({
       camera: this.camera,
       skin: points && this.skin ? { points, faces: surface!.geometry.getIndex()!.array, moved: movedShare(this.skin.points, points, this.range_mm) } : null,
-      vessels: [...this.vessels.values()],
+      vessels: [...this.vessels.values(), ...this.markedLines()],
       sites: this.dots?.visible ? this.sites : [],
       probe: info ? { info, frame: this.probe.matrixWorld } : null,
       image_mm: this.frame ? [this.frame.width_mm, this.frame.height_mm] : [0, 0],

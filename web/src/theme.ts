@@ -6,7 +6,7 @@ import { t } from "./words/language";
 
 /** Of solid things under the lights of the leg's picture. */
 export const SOLID = {
-  vein: 0x5b8def, artery: 0xe0604d, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2, skin: 0x9fb0c2, edge: 0xffffff, site: 0xc9d4e2,
+  vein: 0x5b8def, artery: 0xe0604d, clot: 0xb04fd6, bone: 0xe7dfcb, probe: 0xd3dae2, mark: 0x5cc8c2, skin: 0x9fb0c2, edge: 0xffffff, site: 0xc9d4e2,
   wanted: 0xffc857, reached: 0x5fd38d, cut: 0x2b333e, sky: 0xdfe8f5, floor: 0x3a3632, key: 0xfff3e4, rim: 0x86a8d8,
 } as const;
 type SolidName = keyof typeof SOLID;

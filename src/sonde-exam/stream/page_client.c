@@ -49,7 +49,8 @@ static bool take_message(page_client *client, page_out *out) {
   const page_role role = page_client_role(client), told = client->told_role;
   int topic = SONDE_PAGE_EXAM; // the first whose newest text the client has not got
   while (topic < SONDE_PAGE_STATUS &&
-         (!server->topic[topic].text || client->told_topic[topic] == server->topic[topic].serial))
+         (!server->topic[topic].text || client->told_topic[topic] == server->topic[topic].serial ||
+          (topic == SONDE_PAGE_DRAFT && !client->teacher)))
     ++topic;
   const page_buffer *latest = &server->latest;
   const bool greeted = page_client_greeted(client);

@@ -182,10 +182,11 @@ static void hear(sonde_page_server *server, page_connection *c) {
   if (c->stage == PAGE_ANSWERED) feed(c);
   if (c->stage == PAGE_TALKS) {
     size_t used = 0;
+    const size_t most = c->client->teacher ? PAGE_COMMAND_BYTES : PAGE_SHORT_BYTES;
     while (!c->close_due) {
       page_ws_head head;
       size_t left = c->in_count - used;
-      c->close_due = page_ws_read(c->in + used, left, PAGE_COMMAND_BYTES, &head);
+      c->close_due = page_ws_read(c->in + used, left, most, &head);
       if (c->close_due || !head.head || left < head.head + head.payload) break;
       c->close_due = take_frame(c, &head, c->in + used + head.head);
       used += head.head + head.payload;

@@ -212,7 +212,7 @@ static const char *const TYPES[] = {
     "goal",         "controls",    "stop",        "resume", "ack",  "ping",     "gel",
     "role",         "hand",        "start_exam",  "decide", "hint", "position", "finish_exam",
     "leave_exam",   "list_exams",  "open_replay", "seek",   "play", "comment",  "worksheet",
-    "start_lesson", "demonstrate", "next",        "export"};
+    "start_lesson", "demonstrate", "next",        "export", "edit"};
 _Static_assert(SONDE_COUNT_OF(TYPES) == PAGE_COMMAND_REQUEST + (int)SONDE_PAGE_ASKS, "a type each");
 
 sonde_status page_parse_command(const char *bytes, size_t count, page_command *command,
@@ -239,6 +239,9 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
         error, SONDE_NOT_FOUND,
         "\"type\" must be goal, controls, stop, resume, ack, ping, gel, role, hand or a request of "
         "docs/page_protocol.md");
+  else if (count > PAGE_SHORT_BYTES && which != PAGE_COMMAND_REQUEST + (size_t)SONDE_PAGE_EDIT)
+    r.status = sonde_fail(error, SONDE_FORMAT, "a message of this type has at most %d bytes",
+                          PAGE_SHORT_BYTES);
   else {
     static const char *const GEL[] = {"put", "wipe"}, *const ROLE[] = {"take", "give", "return"};
     static const char *const HAND[] = {"squeeze", "breathe"};
@@ -248,9 +251,10 @@ sonde_status page_parse_command(const char *bytes, size_t count, page_command *c
     switch (command->type) {
     case PAGE_COMMAND_REQUEST:
       read_request(&r, (sonde_page_ask)(which - PAGE_COMMAND_REQUEST), &command->request);
-      // What its members mean is the worksheet's to say, which reads them from a journal too.
+      // What its members mean is the worksheet's to say, which reads them from a journal too, or
+      // the editor's.
       _Static_assert((int)SONDE_PAGE_ENTRY > (int)PAGE_COMMAND_BYTES, "room for its end");
-      if (command->request.ask == SONDE_PAGE_WORKSHEET)
+      if (command->request.ask == SONDE_PAGE_WORKSHEET || command->request.ask == SONDE_PAGE_EDIT)
         memcpy(command->request.entry, bytes, count);
       break;
     case PAGE_COMMAND_GOAL:

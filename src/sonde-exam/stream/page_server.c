@@ -92,12 +92,17 @@ static void apply_controls(sonde_page_server *server, page_client *client,
 void page_command_apply(sonde_page_server *server, page_client *client,
                         const page_command *command) {
   const page_source *source = &server->source;
-  // Everyone who was let in may stop, ask for control, comment and list; the rest is for the client
-  // that controls.
+  // Everyone who was let in may stop, ask for control, comment and list, a teacher edits cases; the
+  // rest is for the client that controls.
   const sonde_page_ask ask = command->request.ask;
-  bool is_free = command->type == PAGE_COMMAND_REQUEST
-                     ? ask == SONDE_PAGE_COMMENT || ask == SONDE_PAGE_LIST_EXAMS
-                     : command->type == PAGE_COMMAND_STOP || command->type == PAGE_COMMAND_ROLE;
+  if (command->type == PAGE_COMMAND_REQUEST && ask == SONDE_PAGE_EDIT && !client->teacher) {
+    page_client_note(client, "cases are edited from the teacher's address");
+    return;
+  }
+  bool is_free =
+      command->type == PAGE_COMMAND_REQUEST
+          ? ask == SONDE_PAGE_COMMENT || ask == SONDE_PAGE_LIST_EXAMS || ask == SONDE_PAGE_EDIT
+          : command->type == PAGE_COMMAND_STOP || command->type == PAGE_COMMAND_ROLE;
   if (!is_free && !page_client_controls(client)) {
     page_client_note(client, "another page controls the probe; this one only watches");
     return;

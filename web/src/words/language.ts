@@ -178,7 +178,7 @@ function walk(value: unknown, member: string): unknown {
   if (typeof value === "string") return SPOKEN.has(member) ? told(value) : value;
   if (Array.isArray(value)) return value.map((v) => walk(v, member));
   if (value === null || typeof value !== "object") return value;
-  const person = "author" in value || "finding" in value || "conclusion" in value; // a text of these was written by one
+  const person = "author" in value || "finding" in value || "conclusion" in value || "serial" in value; // a text of these was written by one
   const scored = "asked" in value || "thrombosis" in value; // the truth of these is a sentence, elsewhere an id
   return Object.fromEntries(Object.entries(value).map(([name, v]) => [name, name === "probes" || (name === "text" && person) ? v : walk(v, name === "truth" && scored ? "diagnosis" : name)]));
 }
