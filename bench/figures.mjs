@@ -375,12 +375,12 @@ const table = (head, rows) =>
 const fenced = text => '```\n' + text.trimEnd() + '\n```'
 const fixed = (value, decimals) => value.toLocaleString('en-US', { minimumFractionDigits: decimals, maximumFractionDigits: decimals })
 
-// What the blocks of the documents show, from the groups' values; undefined where a group is not measured.
 // Times of pictures by instruction set.
 const frames = image => table(['kernels', 'frame', '99 %', 'plane', 'medium', 'scatterers', 'beam', 'picture'],
   ['avx512', 'avx2', 'sse4', 'base'].map(name => [name, ...['frame_ms', 'p99_ms'].map(key => fixed(image[name][key], 1)),
     ...['plane', 'medium', 'scatter', 'beam', 'picture'].map(key => fixed(image[name][key], 2))]))
 
+// What the blocks of the documents show, from the groups' values; undefined where a group is not measured.
 const BLOCKS = {
   course_search({ course }) {
     const name = { full: 'full', hints: 'names alone', exam: 'none' }

@@ -82,9 +82,8 @@ typedef struct sonde_page_def {
   const char *exams_directory; /**< with ID/report.html, exam.json, ...; NULL: none */
   void *user;                  /**< for the function below, which may be NULL */
   /** A request of the client that controls; a comment or the list of exams, of any; an edit, of a
-   *  teacher. Called by one
-   *  thread at a time while the server's clients wait: copy it and return; call nothing of this
-   *  header from it. */
+   *  teacher. Called by one thread at a time while the server's clients wait: copy it and return;
+   *  call nothing of this header from it. */
   void (*request)(void *user, const sonde_page_request *request);
 } sonde_page_def;
 

@@ -216,8 +216,9 @@ static void test_gate(void **unused) {
   close_leg(&l);
 }
 
-// The leg with its vein along the picture, in as good as steady flow.
-static void open_along(leg *l, sonde_flow_scene **scene, sonde_flow *flow) {
+// The leg with its vein along the picture, in as good as steady flow, and its vein's section there.
+static void open_along(leg *l, sonde_flow_scene **scene, sonde_flow *flow,
+                       sonde_vessel_state *vein) {
   open_leg(l);
   l->pose.rotation = q_mul(l->pose.rotation, (sonde_quat){sqrt(0.5), 0, 0, sqrt(0.5)});
   press(l, "healthy", 0);
@@ -226,6 +227,7 @@ static void open_along(leg *l, sonde_flow_scene **scene, sonde_flow *flow) {
   assert_int_equal(sonde_flow_scene_create(NULL, l->in, scene, NULL), SONDE_OK);
   assert_int_equal(sonde_flow_start(&def, flow, NULL), SONDE_OK);
   sonde_flow_scene_run(*scene, flow, 0.5);
+  assert_true(sonde_interior_vessel_at_plane(l->in, 0, tube_pose(radius, length / 2), vein));
 }
 
 // A line of a curved face hears what a flat face's beam hears that leans as much through the same
@@ -241,9 +243,8 @@ static void test_fan_gate(void **unused) {
       leg l;
       sonde_flow_scene *scene = NULL;
       sonde_flow flow;
-      open_along(&l, &scene, &flow);
       sonde_vessel_state vein;
-      assert_true(sonde_interior_vessel_at_plane(l.in, 0, tube_pose(radius, length / 2), &vein));
+      open_along(&l, &scene, &flow, &vein);
       const double z = pose_apply_inverse(l.pose, vein.centre_m).z;
       if (fan) {
         assert_int_equal(sonde_echo_set_radius(l.echo, face_m, NULL), SONDE_OK);
@@ -274,9 +275,8 @@ static void test_window(void **unused) {
   leg l;
   sonde_flow_scene *scene = NULL;
   sonde_flow flow;
-  open_along(&l, &scene, &flow);
   sonde_vessel_state vein;
-  assert_true(sonde_interior_vessel_at_plane(l.in, 0, tube_pose(radius, length / 2), &vein));
+  open_along(&l, &scene, &flow, &vein);
   const sonde_vec3 at = pose_apply_inverse(l.pose, vein.centre_m);
   sonde_gate_settings s = sonde_gate_settings_default();
   s.x_m = at.x, s.z_m = at.z, s.steer_rad = 0.35, s.scale_m_s = 0.5, s.filter_hz = 20;
@@ -296,12 +296,11 @@ static void test_fan_colour(void **unused) {
   leg l;
   sonde_flow_scene *scene = NULL;
   sonde_flow flow;
-  open_along(&l, &scene, &flow);
+  sonde_vessel_state vein;
+  open_along(&l, &scene, &flow, &vein);
   assert_int_equal(sonde_echo_set_radius(l.echo, face_m, NULL), SONDE_OK);
   press(&l, "healthy", 0);
-  sonde_vessel_state vein;
   const sonde_pose across = tube_pose(radius, length / 2);
-  assert_true(sonde_interior_vessel_at_plane(l.in, 0, across, &vein));
   const sonde_vec3 at = pose_apply_inverse(l.pose, vein.centre_m);
   const sonde_colour_box box = {-0.017, 0.017, at.z - 0.008, at.z + 0.012, 0, face_m};
   sonde_flow_scene_cells(scene, l.echo, &box, cells);

@@ -6,15 +6,15 @@
 void spectrum_take(const double echo[][2], uint32_t count, double *power) {
   SONDE_ASSERT(echo && power && count > 0 && count <= SPECTRUM_MOST);
   const uint32_t bins = spectrum_bins(count);
-  double part[SPECTRUM_MOST][2], turn[SPECTRUM_MOST / 2][2], wall[2] = {0, 0}, sum = 0;
-  for (uint32_t k = 0; k < bins / 2; ++k) {
+  double part[SPECTRUM_MOST][2], turn[SPECTRUM_MOST / 2][2], weight[SPECTRUM_MOST];
+  double wall[2] = {0, 0}, sum = 0;
+  for (uint32_t k = 0; k < bins / 2; ++k)
     turn[k][0] = cos(2 * SONDE_PI * k / bins), turn[k][1] = -sin(2 * SONDE_PI * k / bins);
-  }
   // What does not move is the echoes' mean under the weights.
   for (uint32_t n = 0; n < count; ++n) {
-    const double weight = 0.5 - 0.5 * cos(2 * SONDE_PI * n / count);
-    sum += weight;
-    for (int c = 0; c < 2; ++c) wall[c] += weight * echo[n][c];
+    weight[n] = 0.5 - 0.5 * cos(2 * SONDE_PI * n / count);
+    sum += weight[n];
+    for (int c = 0; c < 2; ++c) wall[c] += weight[n] * echo[n][c];
   }
   // Echo n to the place whose bits are those of n the other way round, for the transform below.
   uint32_t bits = 0;
@@ -22,9 +22,8 @@ void spectrum_take(const double echo[][2], uint32_t count, double *power) {
   for (uint32_t n = 0; n < bins; ++n) {
     uint32_t place = 0;
     for (uint32_t b = 0; b < bits; ++b) place |= (n >> b & 1) << (bits - 1 - b);
-    const double weight = n < count ? 0.5 - 0.5 * cos(2 * SONDE_PI * n / count) : 0;
     for (int c = 0; c < 2; ++c)
-      part[place][c] = n < count ? weight * (echo[n][c] - wall[c] / sum) : 0;
+      part[place][c] = n < count ? weight[n] * (echo[n][c] - wall[c] / sum) : 0;
   }
   // Cooley and Tukey: transforms of twice the length from pairs.
   for (uint32_t half = 1; half < bins; half *= 2)

@@ -82,14 +82,11 @@ limb_radii limb_radii_at(const sonde_limb *limb, double level, double angle, dou
                          double turn) {
   const limb_surface *s = &limb->surface;
   SONDE_ASSERT(rise > 0 && turn > 0);
-  place here, up, down;
-  place_level(level, &here), place_level(level - rise, &up), place_level(level + rise, &down);
-  place left = here, right = here;
-  place_angle(angle, &here), place_angle(angle - turn, &left), place_angle(angle + turn, &right);
-  memcpy(up.column, here.column, sizeof up.column),
-      memcpy(up.around, here.around, sizeof up.around);
-  memcpy(down.column, here.column, sizeof down.column);
-  memcpy(down.around, here.around, sizeof down.around);
+  place here;
+  place_level(level, &here), place_angle(angle, &here);
+  place up = here, down = here, left = here, right = here;
+  place_level(level - rise, &up), place_level(level + rise, &down);
+  place_angle(angle - turn, &left), place_angle(angle + turn, &right);
   const double fascia = lookup(s->fascia, &here), fat = lookup(s->fat, &here);
   const place *const beside[4] = {&up, &down, &left, &right};
   double skin[4];

@@ -33,10 +33,11 @@ static void put_head(bytes_cursor *out, uint32_t tag, const char vr[2], uint32_t
   bytes_u16(out, (uint16_t)(tag >> 16));
   bytes_u16(out, (uint16_t)(tag & 0xffff));
   bytes_put(out, vr, 2);
-  static const char has_long_length[][3] = {"OB", "SQ", "UN", "UT"};
+  // Value representations whose length takes 32 bits.
+  static const char long_ones[][3] = {"OB", "SQ", "UN", "UT"};
   bool is_long = false;
-  for (size_t k = 0; k < SONDE_COUNT_OF(has_long_length); ++k)
-    is_long = is_long || memcmp(vr, has_long_length[k], 2) == 0;
+  for (size_t k = 0; k < SONDE_COUNT_OF(long_ones); ++k)
+    is_long = is_long || memcmp(vr, long_ones[k], 2) == 0;
   if (is_long) {
     bytes_u16(out, 0);
     bytes_u32(out, length);

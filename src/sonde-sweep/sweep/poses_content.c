@@ -79,9 +79,9 @@ static void add_point(const pose_content *c, uint32_t i, const view *views, int 
                           -scale * share[side] * slope[side][1], by_share * share[side] / gap};
     // d grey / d motion of that frame: its point moves when the frame moves.
     for (int a = 0; a < 3; ++a) {
-      const int b = (a + 1) % 3, c2 = (a + 2) % 3;
+      const int next = (a + 1) % 3, last = (a + 2) % 3;
       motion[side][a] = -by[a];
-      motion[side][3 + a] = -(by[c2] * foot[side][b] - by[b] * foot[side][c2]);
+      motion[side][3 + a] = -(by[last] * foot[side][next] - by[next] * foot[side][last]);
     }
     // The same point, moved with frame i: its step in the other's axes, turned into those of i.
     double own_by[3];

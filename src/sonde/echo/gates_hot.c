@@ -123,19 +123,21 @@ void sonde_gates_find(sonde_echo *echo, const tissue_job *job, uint32_t j) {
   sonde_gates *g = echo->gates;
   SONDE_ASSERT(j + 1 < echo->plane_rows && job->lines <= SONDE_MOST_LINES);
   SONDE_ASSERT(job->vessels <= MOST_VESSELS && job->bodies <= MOST_BODIES);
-  for (uint32_t v = 0; v < job->vessels && j == 0; ++v)
-    g->reach[v] = job->vessel[v].wall_m + job->vessel[v].sheath_m + margin_m;
-  for (uint32_t k = 0; k < job->bodies && j == 0; ++k) {
-    const sonde_tissue kind = job->body[k].kind;
-    g->reach[job->vessels + k] = kind == SONDE_TISSUE_NODE    ? margin_m
-                                 : kind == SONDE_TISSUE_CUSPS ? cusp_reach
-                                                              : cord_reach;
+  if (j == 0) { // what is the same in all rows, and the first one
+    for (uint32_t v = 0; v < job->vessels; ++v)
+      g->reach[v] = job->vessel[v].wall_m + job->vessel[v].sheath_m + margin_m;
+    for (uint32_t k = 0; k < job->bodies; ++k) {
+      const sonde_tissue kind = job->body[k].kind;
+      g->reach[job->vessels + k] = kind == SONDE_TISSUE_NODE    ? margin_m
+                                   : kind == SONDE_TISSUE_CUSPS ? cusp_reach
+                                                                : cord_reach;
+    }
+    for (uint32_t k = 0; k < job->cells; ++k)
+      g->cell_x[k] = job->cell[k].x_mm, g->cell_y[k] = job->cell[k].y_mm,
+      g->cell_number[k] = job->cell[k].cell;
+    turn_row(echo, job, 0, &g->turned[0]);
   }
-  for (uint32_t k = 0; k < job->cells && j == 0; ++k)
-    g->cell_x[k] = job->cell[k].x_mm, g->cell_y[k] = job->cell[k].y_mm,
-    g->cell_number[k] = job->cell[k].cell;
-  for (uint32_t row = j == 0 ? 0 : j + 1; row <= j + 1; ++row)
-    turn_row(echo, job, row, &g->turned[row % 2]);
+  turn_row(echo, job, j + 1, &g->turned[(j + 1) % 2]);
   g->vessels = g->cells = g->bodies = 0;
   for (uint32_t l = 0; l < job->lines; l += ECHO_ALIGN) {
     const uint32_t end = l + ECHO_ALIGN - 1;
@@ -147,7 +149,7 @@ void sonde_gates_find(sonde_echo *echo, const tissue_job *job, uint32_t j) {
     const uint32_t vessels = things & ((1u << job->vessels) - 1), bodies = things >> job->vessels;
     gate->vessels = list_of(vessels, gate->vessel), gate->bodies = list_of(bodies, gate->body);
     g->vessels |= vessels, g->bodies |= bodies;
-    // Muscle anywhere?
+    // Depth below the muscles' fascia of the deepest of these places: negative, none is in muscle.
     const float *field = echo->plane + j * SONDE_PLANE_COLUMNS;
     float inside = -INFINITY;
     for (uint32_t i = first; i <= last; ++i)
