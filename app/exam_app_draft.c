@@ -31,8 +31,6 @@ static sonde_status show_leg(exam_app *app, const sonde_case *of, sonde_case_set
     sonde_case_setup_clear(leg);
     return SONDE_OK;
   }
-  // The id of a case may tell the truth about it, and learners see this leg too.
-  snprintf(leg->model->name, sizeof leg->model->name, "Leg of a case");
   sonde_status status =
       sonde_page_show_model(app->server, leg->model, app->probes, app->probe_count, error);
   if (status) {
@@ -77,7 +75,7 @@ sonde_status exam_draft_check(exam_app *app, const char *text, sonde_case *out,
     setting = sonde_limb_setting_usual(out->position);
     def.setting = &setting;
   }
-  def.name = out->id, def.provenance = "Synthetic limb of a training case";
+  def.provenance = "Synthetic limb of a training case";
   if (out->thigh != SONDE_CASE_LEG || sonde_limb_draw(&out->leg, out->seed, &body, NULL) ||
       sonde_limb_model(&body, &def, &leg.model, NULL))
     return status;

@@ -1,9 +1,10 @@
 // bench_closing OUT.csv [SEED [BMI...]]: what closes the veins of drawn limbs at the stations of an
 // examination. For women and men of each body mass index (default 19, 24, 30, 36) a row for each
-// vein of each station: the force of a slow press of the linear probe, lying, at which its area in
-// the image plane passes 5 % of that at rest, what the artery beside it keeps there and what the
+// vein of each station: the force of a slow press of a face of 50 x 12 mm, lying, at which its area
+// in the image plane passes 5 % of that at rest, what the artery beside it keeps there and what the
 // vein keeps of its area when it is filled by a clot; the cuffs that close it lying, sitting and
-// standing (docs/interior.md).
+// standing (docs/interior.md). A vein beside the station's beam, or along it, has a press of its
+// own, with the probe slid over it.
 #include "sonde/limb_model.h"
 #include "sonde/limb_vessels.h"
 #include "sonde/sonde.h"
@@ -22,6 +23,10 @@ static const double AT_ONCE_S = -1,
 static const double CUFF_MMHG[][2] = {{14, 40}, {28, 90}, {36, 110}}, CUFF_STEP = 2; // by posture
 static const char *const CLOTS[] = {"acute_occlusive", "subacute_occlusive", "chronic_occlusive",
                                     "partial_mural"};
+static const char *const FACE = "rect:50x12"; // the longest of those that the bands are made for
+static const double BESIDE_M = 5e-3,          // so far from the beam a vein is not under the middle
+    MOST_ALONG_BEAM = 0.5,                    // cosine between a vein that is pressed and the beam
+    ALONG_M = 25e-3, ROUND_M = 0.05;          // how far the probe slides along; the leg's radius
 enum { CLOT_COUNT = 4, POSTURES = 3, MOST_VEINS = SONDE_LIMB_STATION_VEINS };
 
 typedef struct leg {
@@ -37,6 +42,8 @@ typedef struct leg {
 // A vein of a station.
 typedef struct vein {
   int which, artery;       // numbers of the interior
+  sonde_pose probe;        // on the skin
+  bool slid;               // off the station's place
   double depth_m, band[2]; // of its front wall along the beam; forces between which it may close
   bool closed;
   double area, force_n, artery_area; // of the last look; of closing once it is closed
@@ -67,10 +74,47 @@ static int find_vessel(const leg *l, uint32_t vessel) {
   return found;
 }
 
-// The probe `depth_m` below the skin at a station.
-static sonde_pose pose_at(const leg *l, int station, double depth_m) {
-  const sonde_pose on = l->map.station[station].probe;
+// The probe, which lies on the skin, moved `depth_m` along its beam.
+static sonde_pose pushed(sonde_pose on, double depth_m) {
   return pose_shift(on, depth_m, pose_axis(on, 2));
+}
+
+// Puts the probe for a vein of a station and says how deep below the skin the vein's front wall is
+// there: at the station when the vein is under the middle of the face and runs across the beam,
+// else where it does so next, on the nearest skin that the probe reaches by leaning in its plane.
+static void put_probe(const leg *l, sonde_pose station, uint32_t vessel, double arc_m, vein *v) {
+  const double step_m = 1e-3;
+  const sonde_vec3 beam = pose_axis(station, 2), across = pose_axis(station, 0);
+  sonde_limb_vessel_point place = {0};
+  sonde_vec3 middle = {0};
+  for (double way_m = 0; way_m <= ALONG_M; way_m += step_m) {
+    place = sonde_limb_vessel_place(l->limb, vessel, arc_m + way_m);
+    middle = sonde_limb_to_model(l->limb, place.centre_m);
+    const sonde_limb_vessel_point next =
+        sonde_limb_vessel_place(l->limb, vessel, arc_m + way_m + 2 * step_m);
+    const sonde_vec3 run = v_sub(sonde_limb_to_model(l->limb, next.centre_m), middle);
+    v->slid = way_m > 0;
+    if (fabs(v_dot(v_unit(run, across), beam)) < MOST_ALONG_BEAM) break;
+  }
+  const double beside_m = fabs(v_dot(v_sub(middle, station.position), across));
+  v->slid |= beside_m > BESIDE_M;
+  sonde_surface_point best = {0};
+  double least_m = INFINITY;
+  const double most_rad = v->slid ? beside_m / ROUND_M : 0; // the skin turns no more on its way
+  for (double lean = -most_rad; lean <= most_rad; lean += 0.02) {
+    const sonde_vec3 back = v_madd(v_scale(beam, -cos(lean)), sin(lean), across);
+    sonde_surface_point above;
+    if (!sonde_surface_raycast(l->interior->skin, middle, back, 0.2, &above)) continue;
+    const double far_m = v_distance(middle, above.point_m);
+    if (far_m < least_m) least_m = far_m, best = above;
+  }
+  v->probe = station;
+  v->depth_m = isfinite(least_m) ? fmax(least_m - place.radius_m, 1e-3) : 1e-3;
+  if (!v->slid || !isfinite(least_m)) return;
+  const sonde_vec3 down = v_unit(v_sub(middle, best.point_m), beam);
+  const sonde_vec3 y = v_unit(v_cross(down, across), pose_axis(station, 1));
+  v->probe.position = best.point_m;
+  v->probe.rotation = q_from_matrix(m_columns(v_cross(y, down), y, down));
 }
 
 static void update(const leg *l, sonde_pose pose, const sonde_pathology *pathology, double dt_s,
@@ -125,10 +169,9 @@ static sonde_status try_clots(const leg *l, sonde_pose pose, vein *veins, uint32
   return status ? status : fill_veins(l, NULL, error);
 }
 
-// Presses slowly until all veins of the station are closed, or to 1.25 times the end of the deepest
+// Presses slowly at one place until all veins are closed, or to 1.25 times the end of the deepest
 // one's band.
-static sonde_status press(const leg *l, int station, uint32_t count, vein *veins,
-                          sonde_error *error) {
+static sonde_status press(const leg *l, uint32_t count, vein *veins, sonde_error *error) {
   sonde_path_def def = sonde_path_def_default();
   uint32_t open = count;
   double most_n = 0;
@@ -140,8 +183,8 @@ static sonde_status press(const leg *l, int station, uint32_t count, vein *veins
   for (double depth_m = -LIFT_M; open && depth_m < DEEPEST_M && force_n < most_n && !status;
        depth_m += STEP_M) {
     sonde_path_result path;
-    status = sonde_settle_path(l->state, &l->probe, pose_at(l, station, depth_m),
-                               pose_at(l, station, depth_m + STEP_M), &def, NULL, &path, error);
+    status = sonde_settle_path(l->state, &l->probe, pushed(veins->probe, depth_m),
+                               pushed(veins->probe, depth_m + STEP_M), &def, NULL, &path, error);
     if (status || !(path.force_n > 0.05)) continue;
     update(l, path.pose, &l->healthy, dt_s, 0, SONDE_POSTURE_SUPINE);
     dt_s = LATER_S;
@@ -180,11 +223,12 @@ static void try_cuffs(const leg *l, const sonde_limb_station *stations, vein (*v
     sonde_circulation_apply(&still, 0, 1e-3, &filled);
     double before[SONDE_LIMB_STATIONS][MOST_VEINS];
     for (double cuff = CUFF_MMHG[p][0]; cuff <= CUFF_MMHG[p][1]; cuff += CUFF_STEP) {
-      update(l, pose_at(l, 0, -LIFT_M), &filled, AT_ONCE_S, cuff * SONDE_PA_PER_MMHG, POSTURE[p]);
+      update(l, pushed(veins[0]->probe, -LIFT_M), &filled, AT_ONCE_S, cuff * SONDE_PA_PER_MMHG,
+             POSTURE[p]);
       for (int s = 0; s < SONDE_LIMB_STATIONS; ++s)
         for (uint32_t k = 0; k < stations[s].veins; ++k) {
           vein *v = &veins[s][k];
-          double area = area_of(l, v->which, pose_at(l, s, 0)), was = before[s][k];
+          double area = area_of(l, v->which, v->probe), was = before[s][k];
           before[s][k] = area;
           if (!isnan(v->cuff_mmhg[p]) || !(area <= CLOSED)) continue;
           double back = cuff > CUFF_MMHG[p][0] ? (CLOSED - area) / (was - area) : 0;
@@ -234,7 +278,7 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
   sonde_status status = sonde_limb_draw(&body, seed, &body, error);
   if (!status) status = sonde_limb_model(&body, &def, &l.model, error);
   if (!status) status = sonde_vein_map_make(l.model, &l.map, error);
-  if (!status) status = sonde_probe_create("linear", &l.probe, error);
+  if (!status) status = sonde_probe_create(FACE, &l.probe, error);
   if (!status) status = sonde_state_create(l.model, &world, &l.state, error);
   if (!status) status = sonde_interior_create(l.model, &l.interior, error);
   if (!status) status = sonde_pathology_preset("healthy", &l.healthy, error);
@@ -248,17 +292,7 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
         uint32_t mate = sonde_limb_vessel_get(l.limb, stations[s].vein[k]).mate;
         vein *v = &veins[s][k];
         *v = (vein){.area = 1, .artery_area = 1, .which = find_vessel(&l, stations[s].vein[k])};
-        // Each vein has a depth of its own along the station's beam, below the skin above it: the
-        // skin beside the middle of the face is farther down.
-        const sonde_limb_station *at = &stations[s];
-        const sonde_limb_vessel_point place =
-            sonde_limb_vessel_place(l.limb, at->vein[k], at->arc_m[k]);
-        const sonde_vec3 middle = sonde_limb_to_model(l.limb, place.centre_m);
-        const sonde_vec3 beam = pose_axis(l.map.station[s].probe, 2);
-        sonde_surface_point above;
-        const bool met = sonde_surface_raycast(l.interior->skin, middle, v_neg(beam), 0.2, &above);
-        const double front_m = met ? v_distance(middle, above.point_m) - place.radius_m : 0;
-        v->depth_m = fmax(front_m, 1e-3);
+        put_probe(&l, l.map.station[s].probe, stations[s].vein[k], stations[s].arc_m[k], v);
         sonde_limb_force_band(v->depth_m, v->band);
         v->artery = mate == SONDE_LIMB_NO_VESSEL ? 1 : find_vessel(&l, mate);
         for (int c = 0; c < CLOT_COUNT; ++c) v->kept[c] = (double)NAN;
@@ -266,8 +300,14 @@ static sonde_status measure(FILE *out, sonde_sex sex, double bmi, uint64_t seed,
       }
     try_cuffs(&l, stations, veins);
   }
+  // Veins under one face are pressed together, the others one by one.
   for (int s = 0; s < SONDE_LIMB_STATIONS && !status; ++s)
-    status = press(&l, s, stations[s].veins, veins[s], error);
+    for (uint32_t k = 0, together; k < stations[s].veins && !status; k += together) {
+      for (together = 1;
+           !veins[s][k].slid && k + together < stations[s].veins && !veins[s][k + together].slid;)
+        ++together;
+      status = press(&l, together, &veins[s][k], error);
+    }
   if (!status) write_rows(out, &l, sex == SONDE_SEX_MALE ? "male" : "female", bmi, stations, veins);
   sonde_interior_destroy(l.interior);
   sonde_state_destroy(l.state);

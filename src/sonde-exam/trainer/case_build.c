@@ -6,6 +6,10 @@
 
 #include <string.h>
 
+// The id of a case may tell its finding, and the page tells learners the name of the leg they
+// press.
+static const char LEG_NAME[] = "Leg of a case";
+
 // Less clot than this in a segment does not make it a segment with a clot.
 static const double CLOT_M = 0.005;
 
@@ -15,7 +19,7 @@ static sonde_status get_model(const sonde_case *from, const char *bundled, const
     sonde_thigh thigh;
     sonde_thigh_shape *shape = NULL;
     sonde_thigh_def def = sonde_thigh_def_default();
-    def.name = from->id;
+    def.name = LEG_NAME;
     def.provenance = "Synthetic thigh of a training case";
     sonde_status status = sonde_thigh_draw(&from->known, from->seed, &thigh, error);
     if (!status) status = sonde_thigh_shape_create(&thigh, &shape, error);
@@ -26,7 +30,7 @@ static sonde_status get_model(const sonde_case *from, const char *bundled, const
   if (from->thigh == SONDE_CASE_LEG) {
     sonde_limb_body body;
     sonde_limb_model_def def = sonde_limb_model_def_default();
-    def.name = from->id;
+    def.name = LEG_NAME;
     def.provenance = "Synthetic limb of a training case";
     sonde_limb_setting setting;
     if (from->position < SONDE_LIMB_POSITIONS) {
