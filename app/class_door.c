@@ -3,6 +3,7 @@
 #include "class_door.h"
 
 #include "class_results.h"
+#include "class_scorm.h"
 #include "page_token.h"
 
 #include <arpa/inet.h>
@@ -29,7 +30,8 @@ struct class_door {
   pthread_mutex_t lock; // of the places
   uint32_t count;
   place places[CLASS_LEARNERS];
-  double tell_s; // clock of the next news to the board
+  const char *tokens[CLASS_LEARNERS]; // of the places
+  double tell_s;                      // clock of the next news to the board
   class_results results;
 };
 
@@ -71,6 +73,20 @@ static int class_join(void *user, const char *name, bool watches, char answer[SO
   return code;
 }
 
+// ---- learning management systems
+
+static int class_follow(void *user, uint32_t number, int64_t since_unix_s, char **answer) {
+  class_door *d = user;
+  char name[CLASS_NAME], date[24];
+  assert(number >= 1 && number <= d->count);
+  pthread_mutex_lock(&d->lock);
+  memcpy(name, d->places[number - 1].name, sizeof name);
+  pthread_mutex_unlock(&d->lock);
+  sonde_log_date(since_unix_s, date);
+  *answer = class_results_since(&d->results, name, date);
+  return *answer ? 200 : 503;
+}
+
 // ---- opening
 
 // Prints an address for each that leads to this computer.
@@ -101,6 +117,7 @@ int class_door_open(const class_door_def *def, const class_room *room, class_doo
   assert(room->count >= 1 && room->count <= CLASS_LEARNERS);
   if (!d) return app_usage_error(VERB, "out of memory");
   pthread_mutex_init(&d->lock, NULL);
+  pthread_mutex_init(&d->results.lock, NULL);
   d->count = room->count;
   d->listed = def->listed;
   snprintf(d->results.log, sizeof d->results.log, "%s/exams.sqlite", def->exams);
@@ -108,6 +125,7 @@ int class_door_open(const class_door_def *def, const class_room *room, class_doo
     const class_learner *learner = &room->learner[i];
     if (learner->taken) memcpy(d->places[i].name, learner->name, sizeof d->places[i].name);
     memcpy(d->places[i].token, learner->token, sizeof d->places[i].token);
+    d->tokens[i] = d->places[i].token;
     memcpy(d->places[i].watcher_token, learner->watcher_token, sizeof d->places[i].watcher_token);
   }
   sonde_status status = sonde_directory_make(def->data, 0700, true, &error);
@@ -124,7 +142,9 @@ int class_door_open(const class_door_def *def, const class_room *room, class_doo
                            .first_port = room->learner[0].port,
                            .places = room->count,
                            .user = d,
-                           .join = class_join};
+                           .join = class_join,
+                           .learner_tokens = d->tokens,
+                           .follow = class_follow};
     status = sonde_door_open(&door, &d->door, &error);
   }
   memset(identity, 0, sizeof identity);
@@ -136,7 +156,10 @@ int class_door_open(const class_door_def *def, const class_room *room, class_doo
   print_addresses(d, def->address, teacher);
   printf("Certificate: %s/class.pem, SHA-256 %s\n", def->data, print);
   *out = d;
-  return APP_OK;
+  if (!def->scorm) return APP_OK;
+  status = class_scorm_write(def->scorm, d->address, &error);
+  if (!status) printf("SCORM 1.2: %s\n", def->scorm);
+  return status ? app_fail(VERB, &error) : APP_OK;
 }
 
 // ---- while it runs
@@ -198,5 +221,7 @@ void class_door_close(class_door *d) {
   if (!d) return;
   sonde_door_close(d->door);
   pthread_mutex_destroy(&d->lock);
+  pthread_mutex_destroy(&d->results.lock);
+  sonde_free(d->results.entries);
   free(d);
 }

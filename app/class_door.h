@@ -12,6 +12,7 @@ typedef struct class_door_def {
   const char *data;  // directory of certificate and teacher's secret, made when it is missing
   const char *exams; // directory of the learners' exams
   bool listed;       // only who is on the list of names may join
+  const char *scorm; // file of the package for learning management systems; NULL: none
 } class_door_def;
 
 // Opens the port for a class whose tokens are made, and prints code, addresses and fingerprint.

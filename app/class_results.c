@@ -3,6 +3,7 @@
 
 #include <assert.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 
 static void publish(sonde_door *door, sonde_door_text which, sonde_file *file) {
@@ -75,5 +76,40 @@ void class_results_tell(class_results *results, const char *home, sonde_door *do
     sonde_file_discard(one.file);
     sonde_file_discard(table);
   }
-  sonde_free(entries);
+  if (status) {
+    sonde_free(entries);
+    return;
+  }
+  pthread_mutex_lock(&results->lock);
+  sonde_free(results->entries);
+  results->entries = entries, results->count = count;
+  pthread_mutex_unlock(&results->lock);
+}
+
+char *class_results_since(class_results *results, const char *trainee, const char *date) {
+  assert(trainee[0] && date);
+  sonde_json_out out = {.layout = SONDE_JSON_COMPACT};
+  char *text = NULL;
+  size_t size;
+  if (sonde_file_in_memory(&out.file, NULL)) return NULL;
+  sonde_json_begin_object(&out, NULL);
+  sonde_json_put_text(&out, "since", date);
+  sonde_json_begin_list(&out, "exams");
+  pthread_mutex_lock(&results->lock);
+  for (uint32_t i = results->count; i-- > 0;) {
+    const sonde_log_entry *e = &results->entries[i];
+    if (e->interrupted || strcmp(e->trainee, trainee) != 0 || strcmp(e->date, date) < 0) continue;
+    sonde_json_begin_object(&out, NULL);
+    sonde_json_put_text(&out, "id", e->id);
+    sonde_json_put_text(&out, "title", e->case_title);
+    sonde_json_put_real(&out, "score", e->score, 6);
+    sonde_json_put_bool(&out, "passed", e->passed);
+    sonde_json_put_bool(&out, "correct", e->correct);
+    sonde_json_put_real(&out, "seconds", e->metrics.time_s, 6);
+    sonde_json_end(&out);
+  }
+  pthread_mutex_unlock(&results->lock);
+  sonde_json_end(&out);
+  sonde_json_end(&out);
+  return sonde_file_take(out.file, &text, &size, NULL) ? NULL : text;
 }

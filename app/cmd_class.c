@@ -14,7 +14,7 @@ static const char VERB[] = "class";
 
 typedef struct options {
   long learners, port;
-  const char *names, *program, *listen, *data;
+  const char *names, *program, *listen, *data, *scorm;
   char **arguments;
 } options;
 
@@ -34,6 +34,9 @@ static const app_option TABLE[] = {
     OPT_TEXT(data, "data", "DIR",
              "where the certificate and the teacher's secret are kept; default: sonde/class in "
              "$XDG_DATA_HOME or ~/.local/share"),
+    OPT_TEXT(scorm, "scorm", "FILE",
+             "write a SCORM 1.2 package by which a learning management system opens this class and "
+             "keeps the scores of its exams"),
     OPT_TEXT(program, "program", "FILE", NULL),
     OPT_REST(arguments)};
 
@@ -192,7 +195,7 @@ static int begin(const options *s, class_room *room, class_door **door) {
       if (strcmp(word, "--exams") == 0) given = room->arguments[i + 1];
     }
     app_data_home(given, "exams", exams, sizeof exams);
-    class_door_def def = {address, (uint16_t)port, data, exams, s->names != NULL};
+    class_door_def def = {address, (uint16_t)port, data, exams, s->names != NULL, s->scorm};
     int code = class_door_open(&def, room, door);
     if (code != APP_OK) return code;
   }
@@ -240,6 +243,8 @@ static int run(void *from) {
   int code = parse_names(s, &room);
   if (code == APP_OK) code = check_names(s, &room);
   if (code == APP_OK) code = check_arguments(&room);
+  if (code == APP_OK && s->scorm && !s->listen)
+    code = app_usage_error(VERB, "--scorm needs --listen: a package holds the class's address");
   if (code != APP_OK) return code;
   assert(room.count >= 1 && room.count <= CLASS_LEARNERS);
   if (!s->program && app_program(program, sizeof program)) {

@@ -28,6 +28,7 @@ build_packages() {
   need_library libmd libmd-dev # SHA-1 and SHA-256
   need_library openssl libssl-dev # TLS of a class
   need_library yaml-0.1 libyaml-dev
+  need_library minizip libminizip-dev # packages of SCORM
   need_library - libnifti2-dev # no pkg-config file
   need_library zlib zlib1g-dev
   installed python3-dev || missing+=(python3-dev) # the package for Python

@@ -54,6 +54,12 @@ for (const mark of ["@SONDE_TITLE@", "@SONDE_DATA@"])
   if (template.split(mark).length !== 2) throw new Error(`report.html must hold ${mark} once`);
 await writeFile(path.join(out, "report.html"), template);
 
+// What a learning management system opens is one file too.
+await bundle("scorm.ts", "scorm.js");
+const inside = { STYLE: `${await read("src/palette.css")}\n${await read("class.css")}`, SCRIPT: await readFile(path.join(out, "scorm.js"), "utf8") };
+if (/<\/script|<!--/i.test(inside.SCRIPT)) throw new Error("scorm.js holds what would end its script element");
+await writeFile(path.join(out, "scorm.html"), (await read("scorm.html")).replace(/@SONDE_(STYLE|SCRIPT)@/g, (_all, name) => inside[name]));
+
 for (const name of ["index.html", "style.css", "app.js", "class.html", "class.css", "class.js", "report.html"]) {
   const file = path.join(out, name);
   await writeFile(`${file}.gz`, gzipSync(await readFile(file), { level: 9 }));

@@ -21,6 +21,7 @@ enum {
   SONDE_DOOR_ANSWER = 512,     /**< bytes of an answer with its end */
   SONDE_DOOR_CODE = 9,         /**< bytes of a code with its end: 40 bits */
   SONDE_DOOR_FINGERPRINT = 96, /**< bytes of a fingerprint with its end */
+  SONDE_DOOR_TICKET = 33,      /**< bytes of a ticket with its end: 32 hexadecimal digits */
   SONDE_DOOR_IDENTITY = 16384  /**< bytes of key and certificates with their end */
 };
 
@@ -48,6 +49,15 @@ typedef struct sonde_door_def {
    *  @param answer for 200 one JSON object, else a sentence
    *  @return 200, or the HTTP status that refuses */
   int (*join)(void *user, const char *name, bool watches, char answer[SONDE_DOOR_ANSWER]);
+  /** [places] secrets of the learners' addresses, kept by the caller while the door is open. A page
+   * that has one may link a ticket of a learning management system, which then reads that learner's
+   * results from the page of another site. NULL: no system may. */
+  const char *const *learner_tokens;
+  /** What the holder of a place's ticket may read, called by the door's thread.
+   *  @param since_unix_s when the ticket was linked
+   *  @param[out] answer one JSON object, which the door frees with sonde_free()
+   *  @return 200, or the HTTP status that refuses with `answer` untouched */
+  int (*follow)(void *user, uint32_t place, int64_t since_unix_s, char **answer);
 } sonde_door_def;
 
 /** A new private key (P-256) and a certificate that it signed itself, valid for ten years.

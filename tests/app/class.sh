@@ -141,6 +141,13 @@ token=$(client get "$at" class.json "$secret" | grep -oE '"learner_token":"[0-9a
 [[ -n $token && $token != "$watcher" ]] || wrong "a watcher has the learner's secret"
 answers '^200 \{"trainee":"Anna"' get "$at" 1/status.json "$token"
 answers '^404 ' get "$at" 2/status.json "$token" # the fake program's answer to a stranger
+# A learning management system reads what its ticket's learner did since, and nobody else's.
+ticket=0123456789abcdef0123456789abcdef
+answers '^404 ' get "$at" "lms.json?ticket=$ticket"
+answers '^401 ' get "$at" "lms?ticket=$ticket" "$watcher"
+answers '^404 ' get "$at" "lms?ticket=0123" "$token"
+answers '^200 ' get "$at" "lms?ticket=$ticket" "$token"
+answers '^200 \{"since":"20[^"]+","exams":\[\]\}' get "$at" "lms.json?ticket=$ticket"
 
 checks=$((checks + 1)) # strangers that hold every connection cost nobody else
 mkfifo hold
@@ -157,19 +164,23 @@ checks=$((checks + 1)) # the same certificate and teacher's address next time, a
 before="$secret $code"
 mkdir exams
 "$SONDE" exam --recover exams >/dev/null # makes a log without exams
-"$python" - <<'ROWS'
+add_exams() { # "TRAINEE SCORE BROKEN_OFF DATE"...
+  "$python" - "$@" <<'ROWS'
 import sqlite3
+import sys
 log = sqlite3.connect("exams/exams.sqlite")
 columns = [row[1:3] for row in log.execute("PRAGMA table_info(exams)")][1:]
-for i, (name, score, gone) in enumerate([("Anna", 41.5, 0), ("Anna", 88, 0), ('Bo, "B"', 72.25, 0), ("Bo", 0, 1)]):
-    row = {"id": f"2026-{i}", "trainee": name, "case_id": "healthy-lean", "case_title": "First walk", "protocol": "two_point",
-           "guidance": "full", "date": f"2026-11-2{i}T04:40:00Z", "score": score, "passed": int(score > 60), "correct": 1,
-           "interrupted": gone, "seconds": 83.21}
+for name, score, gone, date in (words.rsplit(" ", 3) for words in sys.argv[1:]):
+    row = {"id": f"{date}-{name}", "trainee": name, "case_id": "healthy-lean", "case_title": "First walk", "protocol": "two_point",
+           "guidance": "full", "date": date, "score": float(score), "passed": int(float(score) > 60), "correct": 1,
+           "interrupted": int(gone), "seconds": 83.21}
     values = [row.get(column, "" if kind == "TEXT" else 0) for column, kind in columns]
     log.execute(f"INSERT INTO exams ({','.join(c for c, _ in columns)}) VALUES ({','.join('?' * len(columns))})", values)
 log.commit()
 ROWS
-open_class --names 'Anna,Bo' -- --exams exams
+}
+add_exams "Anna 41.5 0 2026-11-20T04:40:00Z" "Anna 88 0 2026-11-21T04:40:00Z" 'Bo, "B" 72.25 0 2026-11-22T04:40:00Z' "Bo 0 1 2026-11-23T04:40:00Z"
+open_class --names 'Anna,Bo' --scorm class.zip -- --exams exams
 [[ $(client fingerprint "$at") == "$print" && $secret == "${before% *}" && $code != "${before#* }" ]] ||
   wrong "another certificate or secret at the second start, or the same code"
 wait_for "Bo: exam" # who is on the list has a program at once
@@ -180,6 +191,13 @@ grep -qF '"2026-11-22T04:40:00Z","Bo, ""B""","healthy-lean","First walk","two_po
   wrong "the table lacks Bo's exam: $(head -2 table)"
 client get "$at" statements.jsonl "$secret" | sed '1s/^200 //' >statements
 "$python" "$here/check_xapi.py" statements 4 || wrong "no statements of xAPI"
+"$python" "$here/check_scorm.py" class.zip "$at" || wrong "no package of SCORM 1.2"
+token=$(client get "$at" class.json "$secret" | grep -oE '"learner_token":"[0-9a-f]{32}"' | head -1 | grep -oE '[0-9a-f]{32}')
+answers '^200 ' get "$at" "lms?ticket=$ticket" "$token"
+answers '^200 \{"since":"20[^"]+","exams":\[\]\}' get "$at" "lms.json?ticket=$ticket" # Anna's older exams are not the system's
+add_exams "Anna 91 0 2090-01-01T00:00:00Z" "Bo 17 0 2090-01-01T00:00:00Z" "Anna 0 1 2090-01-02T00:00:00Z" # ends, other's, broken off
+for ((i = 0; i < 1200; ++i)); do client get "$at" "lms.json?ticket=$ticket" | grep -q '"score":91,' && break; sleep 0.1; done
+answers '"exams":\[\{[^]]*"score":91,"passed":true,"correct":true,"seconds":83.21\}\]\}$' get "$at" "lms.json?ticket=$ticket"
 answers '^401 ' get "$at" statements.jsonl "$watcher"
 answers '^403 Chris is not on the list' join "$at" "$code" Chris
 answers '^200 \{"place":2,' join "$at" "$code" Bo
@@ -187,4 +205,9 @@ end_class
 chmod 644 data/class.pem
 run class --learners 1 --port "$port" --program "$FAKE_LEARNER" --listen 127.0.0.1:0 --data data
 ((status != 0)) && grep -q 'only you can read' "$err" || wrong "took a key that others can read"
+chmod 600 data/class.pem
+run class --learners 1 --port "$port" --program "$FAKE_LEARNER" --listen 127.0.0.1:0 --data data --scorm not-there/class.zip
+((status == 2)) && grep -q 'not-there' "$err" || wrong "exit $status for a package in a directory that is not there, expected 2"
+run class --learners 1 --scorm class.zip
+((status == 2)) && grep -q -- '--scorm needs --listen' "$err" || wrong "exit $status for a package without an address, expected 2"
 finish

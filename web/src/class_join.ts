@@ -3,6 +3,8 @@
 import { announce, make, recall, remember } from "./dom";
 import { t } from "./words/language";
 
+const MOST_NAME = 40;
+
 interface Place {
   place: number;
   token: string;
@@ -28,8 +30,12 @@ const status = async (at: Place): Promise<number> => {
   }
 };
 
-/** Goes to a place as soon as its program answers. */
-async function enter(at: Place, say: (sentence: string) => void): Promise<void> {
+/** The ticket of the learning management system that opened this page; empty: none did. */
+const ticket = /[?&]lms=([0-9a-f]{32})(&|$)/.exec(location.search)?.[1] ?? "";
+
+/** Goes to a place as soon as its program answers; the learning management system follows a learner there. */
+async function enter(at: Place, say: (sentence: string) => void, learns = true): Promise<void> {
+  if (ticket && learns) await fetch(`lms?ticket=${ticket}`, { headers: { Authorization: `Bearer ${at.token}` }, cache: "no-store" });
   say(t("class.starting"));
   while ((await status(at)) !== 200) await new Promise((done) => setTimeout(done, 500));
   location.assign(addressOf(at));
@@ -57,7 +63,7 @@ export function openJoin(room: HTMLElement): void {
   const roles = make("fieldset");
   roles.append(choice("learner", t("class.examine"), true), choice("watcher", t("class.watch"), false));
   form.append(roles);
-  const name = field("name", t("class.your_name"), { maxLength: 40, value: recall("trainee") });
+  const name = field("name", t("class.your_name"), { maxLength: MOST_NAME, value: new URLSearchParams(location.search).get("name")?.slice(0, MOST_NAME) || recall("trainee") });
   const code = field("code", t("class.code"), { maxLength: 12, spellcheck: false });
   const go = make("button", "primary", t("class.join"));
   const said = make("p", "warn");
@@ -96,7 +102,7 @@ export function openJoin(room: HTMLElement): void {
         remember("place", JSON.stringify(at));
         remember("trainee", name.value.trim());
       }
-      await enter(at, say);
+      await enter(at, say, role === "learner");
     } catch {
       say(t("class.silent_retry"));
     } finally {

@@ -8,6 +8,7 @@
 
 sonde_status sonde_door_open(const sonde_door_def *def, sonde_door **door_out, sonde_error *error) {
   SONDE_ASSERT(def && door_out && def->address && def->identity && def->join && def->places > 0);
+  SONDE_ASSERT(!def->learner_tokens == !def->follow);
   *door_out = NULL;
   if (!def->code || strlen(def->code) != SONDE_DOOR_CODE - 1 ||
       !sonde_page_token_valid(def->teacher_token))
@@ -15,7 +16,11 @@ sonde_status sonde_door_open(const sonde_door_def *def, sonde_door **door_out, s
                       "a class's code has %d characters, a teacher's token %d digits from 0-9a-f",
                       SONDE_DOOR_CODE - 1, SONDE_PAGE_TOKEN - 1);
   sonde_door *door = SONDE_NEW(sonde_door, 1);
-  if (!door) return sonde_fail_memory(error);
+  if (door) door->ticket = SONDE_NEW(door_ticket, def->places);
+  if (!door || !door->ticket) {
+    sonde_free(door);
+    return sonde_fail_memory(error);
+  }
   door->def = *def;
   atomic_store(&door->ask_s, 10);
   atomic_store(&door->code_s, 1);

@@ -49,6 +49,12 @@ typedef struct door_connection {
   bool watches;
 } door_connection;
 
+// What a learning management system may read a learner's results by; empty: nobody has linked one.
+typedef struct door_ticket {
+  char text[SONDE_DOOR_TICKET];
+  int64_t since_unix_s; // when it was linked
+} door_ticket;
+
 struct sonde_door {
   sonde_door_def def;
   _Atomic double ask_s, code_s; // how long a client may greet and ask; until a code is looked at
@@ -62,7 +68,8 @@ struct sonde_door {
   atomic_uint_fast64_t wrong;
   pthread_mutex_t lock; // of the texts
   char *text[SONDE_DOOR_TEXTS];
-  uint64_t accepted; // this and the connections belong to the thread
+  uint64_t accepted;   // this, the tickets and the connections belong to the thread
+  door_ticket *ticket; // [def.places]
   door_connection connection[DOOR_CONNECTIONS];
 };
 

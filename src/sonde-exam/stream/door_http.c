@@ -8,6 +8,7 @@
 #include <openssl/ssl.h>
 #include <string.h>
 #include <strings.h>
+#include <time.h>
 
 static void reply(door_connection *c, int code, const page_body *body) {
   const char *reason = code == 200 ? "OK" : code == 302 ? "Found" : "Refused";
@@ -87,6 +88,44 @@ void door_admit(sonde_door *door, door_connection *c) {
   }
   int code = door->def.join(door->def.user, c->name, c->watches, text);
   reply_copy(c, code, code == 200 ? "application/json" : "text/plain; charset=utf-8", text);
+}
+
+// ---- learning management systems
+
+// /lms links a ticket to the learner whose secret comes with it; /lms.json is what the ticket's
+// holder reads. A ticket that comes again keeps its time: its exams still count.
+static bool reply_lms(sonde_door *door, door_connection *c, const page_request *request) {
+  const bool reads = strcmp(request->path, "/lms.json") == 0;
+  char given[SONDE_DOOR_TICKET], *text = NULL;
+  if (!reads && strcmp(request->path, "/lms") != 0) return false;
+  if (!door->def.learner_tokens ||
+      !page_request_parameter(request, "ticket", given, sizeof given) ||
+      strspn(given, "0123456789abcdef") != sizeof given - 1) {
+    door_refuse(c, 404, "a ticket is 32 hexadecimal digits\n");
+    return true;
+  }
+  uint32_t place = 0;
+  for (uint32_t i = 0; i < door->def.places; ++i) {
+    const char *own = reads ? door->ticket[i].text : door->def.learner_tokens[i];
+    if (page_secret_equal(own, reads ? given : page_request_bearer(request))) place = i + 1;
+  }
+  int code = place ? 200 : reads ? 404 : 401;
+  if (!place) {
+    atomic_fetch_add(&door->wrong, 1);
+  } else if (reads) {
+    code = door->def.follow(door->def.user, place, door->ticket[place - 1].since_unix_s, &text);
+  } else {
+    door_ticket *own = &door->ticket[place - 1];
+    if (strcmp(own->text, given) != 0) own->since_unix_s = (int64_t)time(NULL);
+    memcpy(own->text, given, sizeof own->text);
+  }
+  reply(c, code,
+        &(page_body){.type = "application/json",
+                     .bytes = text ? text : "{}",
+                     .size = text ? strlen(text) : 2,
+                     .owned = text,
+                     .shared = reads});
+  return true;
 }
 
 // ---- going on to a learner's program
@@ -169,7 +208,7 @@ void door_answer(sonde_door *door, door_connection *c, size_t size) {
     pass_on(door, c, &request, size, place, end);
   } else if (strcmp(request.path, "/join") == 0) {
     join(c, &request);
-  } else if (!reply_text(door, c, &request)) {
+  } else if (!reply_lms(door, c, &request) && !reply_text(door, c, &request)) {
     uint32_t count, i = 0;
     const page_file *files = page_class_files(&count);
     while (i < count && strcmp(request.path + 1, files[i].name) != 0) ++i;

@@ -40,7 +40,7 @@ void page_http_send(page_out *out, int code, const char *reason, const page_body
                "HTTP/1.1 %d %s\r\n"
                "Content-Type: %s\r\n"
                "Content-Length: %zu\r\n"
-               "%s"
+               "%s%s"
                "Cache-Control: no-store\r\n"
                "Content-Security-Policy: %s\r\n"
                "X-Content-Type-Options: nosniff\r\n"
@@ -49,6 +49,7 @@ void page_http_send(page_out *out, int code, const char *reason, const page_body
                "Cross-Origin-Opener-Policy: same-origin\r\n"
                "Connection: close\r\n\r\n",
                code, reason, body->type, body->size, body->gzip ? "Content-Encoding: gzip\r\n" : "",
+               body->shared ? "Access-Control-Allow-Origin: *\r\n" : "",
                body->policy ? body->policy : PAGE_POLICY);
   SONDE_ASSERT(size > 0 && (size_t)size < sizeof out->head);
   out->head_size = (size_t)size;

@@ -190,6 +190,7 @@ typedef struct page_body {
   size_t size, mapped;
   void *owned;
   bool gzip;
+  bool shared; // scripts of any other site may read it: a secret in the request says whose it is
 } page_body;
 // Fills an answer with the security headers that all answers have.
 void page_http_send(page_out *out, int code, const char *reason, const page_body *body);
