@@ -11,7 +11,7 @@
 static const char VERB[] = "slice";
 
 typedef struct options {
-  const char *input, *output, *method;
+  const char *input, *output, *method, *deviation;
   frames_options frames;
   press_options press;
   bool compare, json, volume;
@@ -51,6 +51,7 @@ typedef struct work {
   double seconds;
   sonde_likeness likeness;
   bool compared;
+  double deviation_grey, error_over_deviation; // root mean squares
   press_result pressed;
 } work;
 
@@ -73,6 +74,10 @@ static const app_option TABLE[] = {
         stack, "stack", "K", 1, 1000,
         "with --frame or --hold-out: the picture framed in white among every K-th frame, in "
         "a parallel projection from the side; the way along the sweep is stretched"),
+    OPT_TEXT(deviation, "deviation", "FILE",
+             "of a sequence: also write how sure each pixel is, PNG, the expected error's standard "
+             "deviation in quarters of a grey level; with --hold-out also what it is of the true "
+             "error"),
     OPT_TEXT(method, "method", "NAME",
              "of a sequence both, nearest or krige: frames on both sides of a pixel, the nearest "
              "one, or two on either side weighted by how alike the frames are; of a volume linear "
@@ -106,6 +111,8 @@ static int check(void *from) {
     if (length >= end && strcmp(o->input + length - end, ENDS[i]) == 0) o->volume = false;
   }
   if (o->hold_out >= 0) o->frame = (double)o->hold_out;
+  if (o->deviation && (o->volume || o->press.model))
+    return app_usage_error(VERB, "--deviation needs a sequence of frames, without --press");
   if (o->volume && !posed)
     return app_usage_error(VERB, "--frame and --hold-out need a sequence; %s is read as a volume",
                            o->input);
@@ -197,6 +204,40 @@ static sonde_status write_picture(const options *a, work *w, sonde_error *error)
   return sonde_image_save_png(&w->image, a->output, error);
 }
 
+// How sure the picture is, by a slicer of its own; against the frame that was left out, errors over
+// their deviations have a root mean square of 1 when the deviations are true.
+static sonde_status write_deviation(const options *a, work *w, sonde_error *error) {
+  const sonde_sequence *s = &w->sequence;
+  const uint32_t width = w->image.width, height = w->image.height;
+  sonde_slicer_options slicer = a->slicer;
+  sonde_slicer *sure = NULL;
+  sonde_image out = {0};
+  slicer.deviation = true;
+  if (a->hold_out >= 0) slicer.left_out = (uint32_t)a->hold_out;
+  sonde_status status = sonde_slicer_create(s, &slicer, &sure, error);
+  if (!status) status = sonde_image_create(width, height, &out, error);
+  if (!status) {
+    double squares = 0, ratios = 0, count = 0;
+    (void)sonde_slicer_render(sure, &w->plane, &out, NULL);
+    for (size_t k = 0; k < (size_t)width * height; ++k) {
+      if (!w->known[k] || !out.pixels[k]) continue;
+      const double deviation = out.pixels[k] / 4.0;
+      squares += deviation * deviation, count += 1;
+      if (a->hold_out < 0) continue;
+      const size_t row = s->clip[1] + k / width, column = s->clip[0] + k % width;
+      const double real = s->pixels[((size_t)a->hold_out * s->height + row) * s->width + column];
+      const double off = (real - w->image.pixels[k]) / deviation;
+      ratios += off * off;
+    }
+    w->deviation_grey = count > 0 ? sqrt(squares / count) : 0;
+    w->error_over_deviation = a->hold_out >= 0 && count > 0 ? sqrt(ratios / count) : NAN;
+    status = sonde_image_save_png(&out, a->deviation, error);
+  }
+  sonde_image_clear(&out);
+  sonde_slicer_destroy(sure);
+  return status;
+}
+
 static sonde_status slice_sequence(const options *a, work *w, sonde_error *error) {
   sonde_sequence *s = &w->sequence;
   sonde_status status = frames_load(a->input, &a->frames, s, &w->located, error);
@@ -235,7 +276,8 @@ static sonde_status slice_sequence(const options *a, work *w, sonde_error *error
   else
     w->reached = sonde_slicer_render(w->slicer, &w->plane, &w->image, w->known);
   w->seconds = app_seconds(CLOCK_MONOTONIC) - start;
-  return write_picture(a, w, error);
+  if (a->deviation) status = write_deviation(a, w, error);
+  return status ? status : write_picture(a, w, error);
 }
 
 static int run(void *from) {
@@ -270,6 +312,9 @@ static int run(void *from) {
       app_json("rms_grey:%g mae_grey:%g psnr_db:%g ncc:%g ssim:%g", w.likeness.rms_grey,
                w.likeness.mae_grey, w.likeness.psnr_db, w.likeness.ncc, w.likeness.ssim);
     }
+    if (a->deviation)
+      app_json("deviation_grey:%g error_over_deviation:%g", w.deviation_grey,
+               w.error_over_deviation);
     if (a->press.model) {
       app_json("force_n:%g penetration_mm:%g vein_area_ratio:%g artery_area_ratio:%g",
                w.pressed.force_n, w.pressed.depth_m * 1e3, w.pressed.vein_area_ratio,
@@ -288,6 +333,10 @@ static int run(void *from) {
       printf("against real  RMS %.2f, MAE %.2f grey levels, PSNR %.2f dB, NCC %.4f, SSIM %.4f\n",
              w.likeness.rms_grey, w.likeness.mae_grey, w.likeness.psnr_db, w.likeness.ncc,
              w.likeness.ssim);
+    if (a->deviation) printf("expected error %.2f grey levels", w.deviation_grey);
+    if (a->deviation && a->hold_out >= 0)
+      printf(", the true one %.2f times as large", w.error_over_deviation);
+    if (a->deviation) printf("\n");
     if (a->press.model)
       printf(
           "pressed       %.2f N at %.2f mm, vein %.1f %% and artery %.1f %% of their rest area\n",

@@ -137,9 +137,11 @@ typedef struct sonde_slicer_options {
   uint32_t
       left_out_beside; /**< used frames on either side of it that are left out too; default 0 */
   uint32_t threads;    /**< 0 (default): all cores; results do not depend on it */
-  bool once; /**< few pictures are made: without the copy of the frames (1.4 bytes for each
-                  used pixel, BRACKET across only) that makes many fast; the pictures are
-                  the same */
+  bool once;      /**< few pictures are made: without the copy of the frames (1.4 bytes for each
+                       used pixel, BRACKET across only) that makes many fast; the pictures are
+                       the same */
+  bool deviation; /**< pictures show instead how sure they are: the expected error's standard
+                       deviation in quarters of a grey level, at most 255 (63.75 grey levels) */
 } sonde_slicer_options;
 
 SONDE_API sonde_slicer_options sonde_slicer_options_default(void); /**< @thread any */

@@ -119,6 +119,7 @@ rejects 'missing/out' measure absent.sonde --sites absent.csv --probe linear -o 
 rejects 'missing/out' fit absent.csv --surface absent.ply --sites absent.csv -o missing/out.sonde
 rejects 'missing/out' identify absent.sonde --slide absent.csv --site 1 -o missing/out.json
 rejects 'missing/out' reconstruct absent.mha -o missing/out.mha
+rejects 'deviation needs a sequence' slice volume.mha --pose 0,0,0,1,0,0,0 -o x.png --deviation y.png
 rejects 'missing/out' slice absent.igs.mha --frame 1.5 -o missing/out.png
 rejects 'missing/' run "$MODEL" --headless --seconds 0.2 --record missing/a.rec
 rejects 'missing/' fit "$DATA/indentation.csv" --surface "$in/skin.ply" --sites "$DATA/sites.csv" \

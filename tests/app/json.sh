@@ -66,6 +66,8 @@ gives "ticks>=1 same:bool checks:integer" replay a.rec --json
 gives "tracked_frames>=1" replay a.rec --sequence a.igs.mha --json
 rejects 'expected at most' replay a.rec --csv late.csv --from 100
 gives "world=Reference" slice a.igs.mha --frame 0 -o slice.png --json
+gives "deviation_grey>=0" slice a.igs.mha --frame 0 -o slice.png --deviation sure.png --json
+[[ -s sure.png ]] || wrong "sonde slice wrote no expected errors"
 gives "images>=1 image_hash:text same_images:bool" replay a.rec --images --json
 [[ -s a.rec.keys ]] || wrong "sonde run left no keyframes"
 gives "rows>=1 pictures>=1" replay a.rec --csv a.csv --json-file a.json --frames a_png --json

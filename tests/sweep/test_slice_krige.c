@@ -408,6 +408,51 @@ static void an_even_offset_is_a_shift(void **state) {
   sonde_warp_clear(&w);
 }
 
+// Expected errors are those that frames made again have, in the half of the picture with much grain
+// and in that with little, whatever the weights; a frame is sure of itself.
+static void expected_errors_are_true(void **state) {
+  (void)state;
+  static const sonde_slice_method METHOD[] = {SONDE_SLICE_BRACKET, SONDE_SLICE_NEAREST,
+                                              SONDE_SLICE_KRIGE};
+  sonde_sequence s = sweep(30, 0.6);
+  for (int p = 0; p < FRAMES * WIDE * HIGH; ++p) // a third of the contrast on the left
+    if (p % WIDE < WIDE / 2) s.pixels[p] = (uint8_t)(110 + (s.pixels[p] - 110) / 3);
+  sonde_image made = image_of(WIDE, HIGH), sure = image_of(WIDE, HIGH);
+  for (int m = 0; m < 3; ++m) {
+    double square[2] = {0}, expected[2] = {0};
+    for (uint32_t out = 2; out + 2 < FRAMES; ++out) {
+      sonde_slicer *slicer[2];
+      sonde_slicer_options o = sonde_slicer_options_default();
+      o.method = METHOD[m], o.left_out = out;
+      for (int k = 0; k < 2; ++k, o.deviation = true)
+        assert_int_equal(sonde_slicer_create(&s, &o, &slicer[k], NULL), SONDE_OK);
+      const sonde_affine *plane = &s.frames[out].world_from_pixel;
+      uint64_t reached = sonde_slicer_render(slicer[0], plane, &made, NULL);
+      assert_int_equal(sonde_slicer_render(slicer[1], plane, &sure, NULL), reached);
+      for (int p = 0; p < WIDE * HIGH; ++p) {
+        const int half = p % WIDE >= WIDE / 2;
+        if (abs(p % WIDE - WIDE / 2) < 6) continue; // windows there see both
+        const double off = made.pixels[p] - s.pixels[(int)out * WIDE * HIGH + p];
+        square[half] += off * off;
+        expected[half] += sure.pixels[p] * sure.pixels[p] / 16.0;
+      }
+      sonde_slicer_render(slicer[1], &s.frames[out - 1].world_from_pixel, &sure, NULL);
+      for (int p = 0; p < WIDE * HIGH; ++p) assert_true(sure.pixels[p] <= 1);
+      sonde_slicer_destroy(slicer[0]);
+      sonde_slicer_destroy(slicer[1]);
+    }
+    for (int half = 0; half < 2; ++half) {
+      const double ratio = sqrt(square[half] / expected[half]);
+      print_message("method %d, half %d: error %.2f grey levels, over the expected one %.3f\n", m,
+                    half, sqrt(square[half] / ((FRAMES - 4) * WIDE * HIGH / 2)), ratio);
+      assert_true(ratio > 0.94 && ratio < 1.02);
+    }
+  }
+  sonde_image_clear(&made);
+  sonde_image_clear(&sure);
+  sonde_sequence_clear(&s);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_frames_place_gives_the_frame),
@@ -421,6 +466,7 @@ int main(void) {
       cmocka_unit_test(a_deformed_picture_is_off_by_less_than_a_tenth),
       cmocka_unit_test(a_deformed_picture_is_where_the_field_says),
       cmocka_unit_test(an_even_offset_is_a_shift),
+      cmocka_unit_test(expected_errors_are_true),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -137,7 +137,8 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
   bool enough = slicer->planes && slicer->reached && make_scratch(slicer, s->count);
   if (!enough) status = sonde_fail_memory(error);
   slicer->bank = bank;
-  slicer->owns_bank = !bank && o.method == SONDE_SLICE_KRIGE;
+  const bool likened = o.method == SONDE_SLICE_KRIGE || o.deviation;
+  slicer->owns_bank = !bank && likened;
   if (!status && slicer->owns_bank) status = sonde_slice_bank_create(s, &slicer->bank, error);
   // Planes of the frames in use, their normals to one side for the whole sweep.
   sonde_vec3 previous = vec3(0, 0, 0);
@@ -168,7 +169,7 @@ sonde_status sonde_slicer_create_with(const sonde_sequence *s, const sonde_slice
     slice_shift(p + 1, p, p[1].last_shift);
   }
   if (!status) status = lay_out(s, slicer, error);
-  if (!status && o.method == SONDE_SLICE_KRIGE) status = sonde_slicer_krige(slicer, error);
+  if (!status && likened) status = sonde_slicer_krige(slicer, error);
   if (status) sonde_slicer_destroy(slicer);
   *out = status ? NULL : slicer;
   return status;
@@ -226,6 +227,7 @@ uint64_t sonde_slicer_render(sonde_slicer *slicer, const sonde_affine *world_fro
     }
     for (uint32_t k = 0; k < 3; ++k) slicer->forms[k * slicer->count + i] = plane->forms.d[k];
   }
+  if (slicer->options.deviation) return sonde_slicer_deviate(slicer, image, known);
   uint32_t rows = (image->height + SLICE_BLOCK - 1) / SLICE_BLOCK;
   uint32_t workers = slicer->workers < rows ? slicer->workers : rows;
   if (workers > 1)

@@ -174,6 +174,16 @@ sonde_status sonde_slice_bank_create(const sonde_sequence *sequence, slice_bank 
 void sonde_slice_bank_destroy(slice_bank *bank);
 // Chooses the way of joining and fills the tables of weights.
 sonde_status sonde_slicer_krige(sonde_slicer *slicer, sonde_error *error);
+// r(d) of a scale.
+static inline double slice_likeness_at(const slice_decay *d, double distance_m) {
+  return distance_m > 0 ? exp(-pow(distance_m / d->length_m, d->power)) : 1;
+}
+// Weights of n frames at `at` for the place x, of least expected square error for one scale; with
+// `whole` they add up to one.
+void slice_krige_scale(const slice_decay *d, int n, const double *at, double x, bool whole,
+                       double *weights);
+// The picture of deviations, whose planes' forms are set. Returns the pixels reached.
+uint64_t sonde_slicer_deviate(const sonde_slicer *slicer, sonde_image *image, uint8_t *known);
 sonde_status sonde_slicer_check(const sonde_sequence *sequence, const sonde_slicer_options *options,
                                 sonde_error *error);
 // The same as sonde_slicer_create with a bank of the caller's, NULL to make one when needed.

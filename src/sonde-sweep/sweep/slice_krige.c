@@ -232,10 +232,6 @@ static double product(const slice_bank *bank, uint32_t a, uint32_t b, int joinin
   return (double)bank->pairs[low * (LAGS + 1) + high - low].mean[joining][level];
 }
 
-static double likeness_at(const decay *d, double distance_m) {
-  return distance_m > 0 ? exp(-pow(distance_m / d->length_m, d->power)) : 1;
-}
-
 static void fit(const sonde_slicer *slicer, slice_model *m, int level) {
   bin bins[BINS];
   double sum = 0, count = 0;
@@ -316,12 +312,11 @@ static void solve(int n, double a[][SLICE_JOINED + 1], double *b) {
   }
 }
 
-// Weights of frames at `at` for the place x; with `whole` they add up to one.
-static void krige_scale(const decay *d, int n, const double *at, double x, bool whole, double *w) {
+void slice_krige_scale(const decay *d, int n, const double *at, double x, bool whole, double *w) {
   double a[SLICE_JOINED + 1][SLICE_JOINED + 1], b[SLICE_JOINED + 1];
   for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) a[i][j] = likeness_at(d, fabs(at[i] - at[j]));
-    b[i] = likeness_at(d, fabs(at[i] - x));
+    for (int j = 0; j < n; ++j) a[i][j] = slice_likeness_at(d, fabs(at[i] - at[j]));
+    b[i] = slice_likeness_at(d, fabs(at[i] - x));
     a[i][n] = a[n][i] = b[n] = 1;
   }
   a[n][n] = 0;
@@ -335,7 +330,7 @@ static void weights_at(const decay decays[SLICE_LEVELS], int n, const double *at
   double w[SLICE_JOINED], finer[SLICE_JOINED] = {0};
   memset(out, 0, sizeof *out);
   for (int k = 0; k < SLICE_LEVELS; ++k) {
-    krige_scale(&decays[k], n, at, x, k + 1 == SLICE_LEVELS, w);
+    slice_krige_scale(&decays[k], n, at, x, k + 1 == SLICE_LEVELS, w);
     for (int i = 0; i < n; ++i) {
       out->of[slots[i]][k] = (float)(w[i] - finer[i]); // scales are differences of levels
       finer[i] = w[i];
@@ -359,7 +354,7 @@ static bool foretell(const sonde_slicer *s, const slice_model *m, uint32_t i, do
     at[k] = steps[k] < 0 ? -d : d;
   }
   for (int level = 0; level < SLICE_LEVELS; ++level) {
-    krige_scale(&m->decays[level], SLICE_JOINED, at, 0, level + 1 == SLICE_LEVELS, w);
+    slice_krige_scale(&m->decays[level], SLICE_JOINED, at, 0, level + 1 == SLICE_LEVELS, w);
     double square = product(bank, i, i, m->along_sweep, level);
     for (int k = 0; k < SLICE_JOINED; ++k) {
       square -= 2 * w[k] * product(bank, i, from[k], m->along_sweep, level);
@@ -409,7 +404,7 @@ sonde_status sonde_slicer_krige(sonde_slicer *s, sonde_error *error) {
     if (k == 0 || m.error < s->model.error) s->model = m;
     if (k == 0 || (k == 1 && m.error < s->pose_model.error)) s->pose_model = m;
   }
-  s->options.along_sweep = s->pose_model.along_sweep;
+  if (s->options.method == SONDE_SLICE_KRIGE) s->options.along_sweep = s->pose_model.along_sweep;
   for (uint32_t i = 0; i + 1 < s->count; ++i) {
     // Weights between a plane and the next one, with the planes beyond both where they go on alike.
     int32_t lower = (int32_t)i;
