@@ -7,6 +7,20 @@ import { button, find, make, minutes } from "./dom";
 import { decode, type Exam, type Frame, type TextMessage } from "./protocol";
 import { shown, t, told, translated } from "./words/language";
 
+/** What a learner's program is doing, by the word that the class's program has for it. */
+const STATES: Record<string, string> = {
+  "given up": t("class.state.given_up"),
+  ended: t("class.state.ended"),
+  starting: t("class.state.starting"),
+  practice: t("class.state.practice"),
+  preparing: t("class.state.preparing"),
+  running: t("class.state.running"),
+  done: t("class.state.done"),
+  replay: t("class.state.replay"),
+  film: t("class.state.film"),
+  edit: t("class.state.edit"),
+};
+
 interface Learner {
   place: number;
   name: string;
@@ -82,7 +96,8 @@ class Card {
   tell(learner: Learner, address: string): void {
     this.learner = learner;
     this.title.textContent = learner.name;
-    this.state.textContent = learner.elapsed_s === null ? learner.state : `${learner.state} ${minutes(learner.elapsed_s)}`;
+    const state = STATES[learner.state] ?? learner.state;
+    this.state.textContent = learner.elapsed_s === null ? state : `${state} ${minutes(learner.elapsed_s)}`;
     this.canvas.setAttribute("aria-label", t("class.image_of", { name: learner.name }));
     this.comment.setAttribute("aria-label", t("class.comment_for", { name: learner.name }));
     this.open.setAttribute("aria-label", t("class.open_of", { name: learner.name }));
