@@ -17,10 +17,10 @@ enum { MAX_PROBES = 16 };
 typedef struct options {
   const char *model, *record, *probe, *pathology, *preset, *compare;
   const char *trainee, *exams, *cases, *own_cases, *protocols, *course, *scanner;
-  const char *igtl, *push;
+  const char *igtl, *push, *moduli;
   long port, images_hz;
   double seconds, gel_m3;
-  bool headless, lockstep, json, no_gel, circulate;
+  bool headless, lockstep, json, no_gel, circulate, solid;
   sonde_posture posture;
   double valve_leak;
   run_device device;
@@ -53,6 +53,12 @@ static const app_option TABLE[] = {
     OPT_TEXT(preset, "preset", "FILE", "damping, stiffness and friction, see sonde-identify(1)"),
     OPT_TEXT(compare, "compare", "FILE",
              "a second preset, which the controls of the page can change over to"),
+    OPT_FLAG(solid, "solid",
+             "the hyperelastic solid bears the probe instead of the springs, and moves vessels, "
+             "labels and picture (docs/solid.md); it wants a processor more"),
+    OPT_TEXT(
+        moduli, "moduli", "FILE",
+        "materials of the solid, as sonde fit --solid writes them; default those of the study"),
     OPT_TEXT(scanner, "scanner", "NAME|FILE",
              "a scanner that ships (sonde scanner list) or a file; default venous"),
     OPT_INTEGER(images_hz, "images-hz", "N", 1, 50,
@@ -113,6 +119,7 @@ typedef struct summary {
   double latency_s[2]; // from pose to image: median, 99 %; NaN in lockstep
   uint64_t ticks, images, hash;
   sonde_loop_stats loop;
+  sonde_session_solid_counts solid;
 } summary;
 
 // Whom frames go to by OpenIGTLink; NULL: nobody.
@@ -157,6 +164,9 @@ static int check(void *from) {
   options *s = from;
   if ((app_option_given("seconds") || s->lockstep || s->json) && !s->headless)
     return app_usage_error("run", "--seconds, --lockstep and --json need --headless");
+  if (s->moduli && !s->solid) return app_usage_error("run", "--moduli goes with --solid");
+  if (s->preset && s->solid)
+    return app_usage_error("run", "--solid goes without --preset, which is of the springs");
   if (s->compare && !s->preset)
     return app_usage_error("run", "--compare needs a --preset to compare with");
   // A page practises on a whole leg; a place that is named and recorded poses are the thigh's.
@@ -278,6 +288,24 @@ static void watch(sonde_session *session, summary *seen) {
   sonde_session_control(session, &controls);
 }
 
+// How the solid kept up.
+static void print_solid(const summary *seen, bool json) {
+  const sonde_session_solid_counts *c = &seen->solid;
+  // Of passes and places, in processors.
+  const double share = ((double)c->passes * c->pass_mean_s + c->build_s) / seen->wall_s;
+  if (!json) {
+    printf("\nsolid: %llu passes of %.1f ms, %u late, %u places, %.2f of a processor",
+           (unsigned long long)c->passes, 1e3 * c->pass_mean_s, c->late, c->places, share);
+    return;
+  }
+  app_json_object("solid");
+  app_json("passes:%lu passes_late:%u pass_mean_ms:%g pass_max_ms:%g factors:%lu places:%u "
+           "places_refused:%u places_s:%g hand_over_max_n:%g core_share:%g images_per_s:%g",
+           c->passes, c->late, 1e3 * c->pass_mean_s, 1e3 * c->pass_most_s, c->factors, c->places,
+           c->refused, c->build_s, c->handed_over_n, share, (double)seen->images / seen->wall_s);
+  app_json_close();
+}
+
 static void print_summary(const options *s, const summary *seen) {
   if (s->json) {
     char hash[20];
@@ -300,6 +328,8 @@ static void print_summary(const options *s, const summary *seen) {
     if (seen->link.exchanges) {
       app_json("device_exchanges:%lu device_losses:%lu", seen->link.exchanges, seen->link.losses);
     }
+    if (s->solid) print_solid(seen, true);
+    app_json("tissue:%s", s->solid ? "solid" : "springs");
     if (isfinite(seen->gel_volume_m3)) {
       app_json("gel_ml:%g gel_coupling:%g", 1e6 * seen->gel_volume_m3, seen->gel_coupling);
     }
@@ -332,6 +362,7 @@ static void print_summary(const options *s, const summary *seen) {
   if (seen->link.exchanges)
     printf("\ndevice %s: %llu exchanges, lost %llu times", s->device.name,
            (unsigned long long)seen->link.exchanges, (unsigned long long)seen->link.losses);
+  if (s->solid) print_solid(seen, false);
   printf("\nstate hash %016llx\n", (unsigned long long)seen->hash);
   if (seen->loop.priority_note[0]) printf("note: %s\n", seen->loop.priority_note);
   if (seen->restores)
@@ -397,6 +428,7 @@ static int simulate(const options *s, const sonde_model *model, sonde_session_de
     seen.link = sonde_device_link_of(sonde_session_device(session));
     seen.hash = sonde_session_hash(session);
     seen.loop = sonde_session_loop(session);
+    seen.solid = sonde_session_solid_count(session);
   } else if (!status)
     status = run_page(s, def, session, &error);
   sonde_error late = {0};
@@ -428,6 +460,7 @@ static int run(void *from) {
   def.gel_m3 = s->gel_m3;
   def.ticks_per_image = (uint32_t)lround(1 / (def.world.dt_s * (double)s->images_hz));
   sonde_scanner scanner;
+  sonde_session_solid solid = sonde_session_solid_default();
   def.circulate = s->circulate || !s->headless; // the page has buttons for posture and strain
   def.controls.posture = s->posture;
   def.circulation.valve_leak = s->valve_leak;
@@ -454,6 +487,10 @@ static int run(void *from) {
   if (!status && s->scanner) {
     status = scanner_choose(s->scanner, &scanner, &error);
     def.scanner = &scanner, def.controls.echo = scanner.settings;
+  }
+  if (!status && s->solid) {
+    def.solid = &solid;
+    if (s->moduli) status = sonde_moduli_load(s->moduli, solid.layer, &error);
   }
   for (int k = 0; k < SONDE_SESSION_PRESETS && presets[k] && !status; ++k)
     status = sonde_preset_load(presets[k], &def.presets[def.preset_count++], &error);

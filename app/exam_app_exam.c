@@ -44,6 +44,7 @@ static void watch(void *user, const sonde_frame *frame) {
 static sonde_status begin_part(exam_app *app, exam *of, uint32_t held, uint32_t part,
                                sonde_error *error) {
   char recording[EXAM_PATH], *setup = NULL;
+  snprintf(of->tissue, sizeof of->tissue, "%s", app->def.practice.solid ? "solid" : "springs");
   const sonde_case_setup *lies = &of->setups.held[held];
   sonde_status status = exam_setup_text(of, lies->position, &setup, error);
   if (status) return status;

@@ -14,7 +14,8 @@ static const char *name_of(const exam *of) {
 }
 
 static sonde_score_note note_of(const exam *of) {
-  return (sonde_score_note){of->id, name_of(of), of->protocol->id, of->guidance, of->date};
+  return (sonde_score_note){of->id,       name_of(of), of->protocol->id,
+                            of->guidance, of->date,    of->tissue};
 }
 
 static sonde_log_entry entry_of(const exam *of) {
@@ -124,6 +125,7 @@ sonde_status exam_setup_text(const exam *of, sonde_limb_position position, char 
                                   {"protocol", of->protocol->id},
                                   {"guidance", of->guidance},
                                   {"date", of->date},
+                                  {"tissue", of->tissue},
                                   {"position", sonde_position_key(position)},
                                   {"patient", patient}};
   status = exam_note_text(texts, sizeof texts / sizeof texts[0], text, error);

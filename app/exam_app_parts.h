@@ -62,7 +62,7 @@ typedef struct exam {
   sonde_judge *judge; // under the lock
   bool scored;
   sonde_score score;
-  char date[32];
+  char date[32], tissue[8];              // tissue: solid or springs
   bool noted, in_journal, filed, logged; // the score is a note; on the disk: inputs; files; row
   bool gap_told;                         // that inputs are missing
   double retry_s;                        // clock of the next attempt to write

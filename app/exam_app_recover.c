@@ -193,6 +193,7 @@ static sonde_status fill(exam *of, const sonde_json *setup, const exam_places *p
   copy_member(setup, "trainee", of->trainee, sizeof of->trainee);
   copy_member(setup, "guidance", of->guidance, sizeof of->guidance);
   copy_member(setup, "date", of->date, sizeof of->date);
+  copy_member(setup, "tissue", of->tissue, sizeof of->tissue);
   copy_member(setup, "protocol", name, sizeof name);
   const char *text = sonde_json_as_text(sonde_json_member(setup, "patient"));
   if (!text) return app_error(error, SONDE_FORMAT, "%s: names no patient", of->directory);

@@ -81,13 +81,15 @@ typedef struct sonde_session_def {
   const sonde_findings *findings; /**< copied; NULL: none */
   const struct sonde_scanner *scanner; /**< copied; live pictures by it (echo_scanner.h); NULL: the
                                             plain one */
-  uint32_t image_width, image_height;  /**< default 512 x 512 */
-  uint32_t ticks_per_image;            /**< lockstep: an image every so many ticks; real time: no
-                                            more often, when the image thread is free; default 20 */
-  const char *record_path;             /**< NULL: no recording; format: docs/recording.md. A file
-                                            that is there gets the name PATH.old */
-  const char *record_setup; /**< text of a SONDE_NOTE_SETUP that is on the disk before the
-                                 first tick; NULL: none */
+  /** Copied; bears the probe (exam_solid.h); NULL: springs do. */
+  const struct sonde_session_solid *solid;
+  uint32_t image_width, image_height; /**< default 512 x 512 */
+  uint32_t ticks_per_image;           /**< lockstep: an image every so many ticks; real time: no
+                                           more often, when the image thread is free; default 20 */
+  const char *record_path;            /**< NULL: no recording; format: docs/recording.md. A file
+                                           that is there gets the name PATH.old */
+  const char *record_setup;           /**< text of a SONDE_NOTE_SETUP that is on the disk before the
+                                           first tick; NULL: none */
   /** Gets every image, also those that no reader of sonde_session_frame() sees; NULL: nobody.
    *  @thread image thread, or the owner's in lockstep and in sonde_session_stop() */
   void (*watch)(void *user, const sonde_frame *frame);
@@ -119,8 +121,7 @@ typedef struct sonde_snapshot {
                                     negative above the skin */
   double contact_volume_m3, contact_area_m2;
   double vein_area_ratio, artery_area_ratio; /**< at the image plane; NaN when not in view */
-  double other_vein_ratio; /**< greatest of a second or third femoral and a second popliteal vein
-                                there; NaN when none is */
+  double other_vein_ratio; /**< greatest of doubled femoral and popliteal veins there; NaN: none */
   double vein_short_m;     /**< AP diameter */
   sonde_vec3 vein_rest_m;  /**< where the image plane cuts the vein, on its course at rest; NaN when
                                 not in view */
@@ -133,6 +134,7 @@ typedef struct sonde_snapshot {
   double gel_volume_m3; /**< on the skin; NaN while the controls' gel is off */
   double gel_coupling;  /**< mean over the lines of the image, 0..1; likewise */
   double venous_pressure_pa, arterial_pressure_pa; /**< in the vessels */
+  bool solid;                                      /**< bears the probe; no contact volume */
   uint32_t awake_nodes, solver_iterations, flags;
   uint32_t restores; /**< times the probe was taken off and the skin restored to rest, because the
                           probe's path would have turned it inside out (docs/exam.md) */

@@ -40,6 +40,7 @@ SONDE_API sonde_solid_live_def sonde_solid_live_def_default(void); /**< @thread 
 typedef struct sonde_solid_contact {
   sonde_vec3 force_n;   /**< on the probe */
   sonde_vec3 torque_nm; /**< on the probe, about its origin */
+  double area_m2;       /**< skin in contact, at rest */
   uint32_t points;      /**< of the skin's quadrature that bear a force */
   uint32_t sweeps;      /**< of projected Gauss-Seidel */
 } sonde_solid_contact;

@@ -54,6 +54,7 @@
 #include "sonde/exam.h"
 #include "sonde/exam_journal.h"
 #include "sonde/exam_player.h"
+#include "sonde/exam_solid.h"
 #include "sonde/trainer.h"
 #include "sonde/trainer_setup.h"
 #include "sonde/trainer_protocol.h"

@@ -188,6 +188,7 @@ SONDE_API void sonde_score_explain(const sonde_score *score, const sonde_plan *p
 /** What a result file says beside the score; texts may be NULL. */
 typedef struct sonde_score_note {
   const char *exam, *trainee, *protocol, *guidance, *date;
+  const char *tissue; /**< "solid"; NULL or empty: springs */
 } sonde_score_note;
 struct sonde_worksheet;
 struct sonde_sheet_verdict;

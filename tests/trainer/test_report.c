@@ -273,7 +273,7 @@ static sonde_exam_report hostile(void) {
   snprintf(made.plan.point[13].title, sizeof made.plan.point[13].title, "%s", NASTY);
   snprintf(made.earlier[0].case_title, sizeof made.earlier[0].case_title, "%s", NASTY);
   snprintf(made.earlier[1].date, sizeof made.earlier[1].date, "%.20s", NASTY);
-  r.note = (sonde_score_note){NASTY, NASTY, NASTY, NASTY, NASTY};
+  r.note = (sonde_score_note){NASTY, NASTY, NASTY, NASTY, NASTY, NASTY};
   r.recording = NASTY;
   snprintf(made.comments[0].author, sizeof made.comments[0].author, "%.60s", NASTY);
   snprintf(made.comments[0].text, sizeof made.comments[0].text, "%s", NASTY);

@@ -218,6 +218,8 @@ static void files_say_the_same(void **state) {
   assert_string_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(root, "exam"), "title")->valuestring,
                       truth.title);
   assert_true(cJSON_IsNull(cJSON_GetObjectItem(cJSON_GetObjectItem(root, "exam"), "date")));
+  assert_string_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(root, "exam"), "tissue")->valuestring,
+                      "springs");
   uint32_t presses;
   sonde_judge_compressions(judge, &presses);
   assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "presses")), presses);

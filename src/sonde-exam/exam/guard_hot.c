@@ -63,6 +63,7 @@ bool sonde_subject_guard(sonde_subject *subject, const sonde_probe *probe, sonde
 
 uint32_t sonde_subject_flags(const sonde_subject *subject) {
   uint32_t flags = sonde_state_flags(subject->state);
+  if (subject->now.broken) flags |= SONDE_FLAG_NON_FINITE;
   const sonde_subject_moment *now = &subject->now;
   double since_s = (double)(sonde_state_tick(subject->state) - now->off_tick) * subject->dt_s;
   return now->restores > 0 && since_s < shown_s ? flags | SONDE_FLAG_INSIDE_OUT : flags;

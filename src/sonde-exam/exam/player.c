@@ -144,7 +144,10 @@ static bool tick_once(sonde_player *player) {
        player->next_event < player->event_count && player->events[player->next_event].tick <= tick;
        ++player->next_event)
     controls = &player->events[player->next_event].controls;
-  sonde_session_replay(player->session, controls, &record.sample);
+  // What the tick took over is done before it.
+  if (player->session->subject->solid)
+    sonde_solid_leg_await(player->session->subject->solid, record.did);
+  sonde_session_replay(player->session, controls, &record.sample, record.did);
   make_image(player);
   if (player->covered == tick) player->covered = tick + 1;
   return true;
@@ -299,7 +302,7 @@ double sonde_player_time(const sonde_player *player) {
 }
 
 uint64_t sonde_player_hash(sonde_player *player) {
-  return sonde_state_hash(player->session->state);
+  return sonde_subject_hash(player->session->subject);
 }
 
 sonde_session_controls sonde_player_controls(const sonde_player *player) {

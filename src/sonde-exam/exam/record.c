@@ -80,7 +80,7 @@ void sonde_recorder_write(sonde_recorder *recorder, const sonde_record *record) 
   bytes_u32(&w, record->tag);
   switch (record->tag) {
   case SONDE_RECORD_TICK:
-    bytes_u32(&w, record->sample.present ? 1 : 0);
+    bytes_u32(&w, (record->sample.present ? 1 : 0) | record->did << 1);
     bytes_u64(&w, record->tick);
     bytes_u32(&w, record->sample.buttons);
     bytes_u32(&w, 0);

@@ -10,7 +10,7 @@
 #include "exam/setup.h"
 
 enum {
-  SONDE_RECORD_VERSION = 10,
+  SONDE_RECORD_VERSION = 11,
   SONDE_RECORD_JOURNAL = 8, // from this version on a recording is a journal
   SONDE_RECORD_OLDEST = 3,  // that can be read
   SONDE_RECORD_TICK = 1,
@@ -47,6 +47,7 @@ typedef struct sonde_record_image {
 // What the ring carries. Controls of a tick come before the tick, its image behind it.
 typedef struct sonde_record {
   uint32_t tag;
+  uint32_t did; // of a tick: bits of SONDE_LEG_, what came of the solid
   uint64_t tick;
   union {
     sonde_device_sample sample;

@@ -5,6 +5,7 @@
 #include "base/maths.h"
 #include "base/bytes.h"
 #include "haptics/motion.h"
+#include "solid/leg.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -182,7 +183,9 @@ bool sonde_recording_next(sonde_recording *r, sonde_record *record) {
   bytes_reader reader = {(const unsigned char *)r->bytes + r->at + 4};
   switch (tag) {
   case SONDE_RECORD_TICK: {
-    record->sample.present = bytes_take_u32(&reader) & 1;
+    const uint32_t bits = bytes_take_u32(&reader);
+    record->sample.present = bits & 1;
+    record->did = bits >> 1 & (SONDE_LEG_PASS | SONDE_LEG_PLACE);
     record->tick = bytes_take_u64(&reader);
     record->sample.buttons = bytes_take_u32(&reader);
     (void)bytes_take_u32(&reader);

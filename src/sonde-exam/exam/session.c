@@ -66,6 +66,8 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
     session->positions_at = place(&surface_end, vectors);
     session->forces_at = place(&surface_end, vectors);
     session->film_at = place(&surface_end, session->nodes * sizeof(double));
+    session->solid_at =
+        place(&surface_end, def->solid ? SONDE_LEG_NODES_MOST * sizeof(sonde_vec3) : 0);
     session->skin_at = place(&frame_end, 3 * session->nodes * sizeof(float));
     session->pixels_at = place(&frame_end, (size_t)session->image_width * session->image_height);
     session->colour_at = place(&frame_end, (size_t)session->image_width * session->image_height);
@@ -89,6 +91,15 @@ static sonde_status create_parts(sonde_session *session, const sonde_session_def
                                 &session->subject, error);
   if (status) return status;
   session->state = session->subject->state;
+  if (def->solid) {
+    status = sonde_subject_give_solid(session->subject, session->interior, session->probes, count,
+                                      error);
+    session->solid_skin_m = SONDE_NEW(sonde_vec3, session->nodes);
+    session->solid_pushes = SONDE_NEW(sonde_vec3, session->nodes);
+    if (!status && !(session->solid_skin_m && session->solid_pushes))
+      status = sonde_fail_memory(error);
+    if (status) return status;
+  }
   sonde_shared_controls_set(&session->requested, &session->controls);
   if (session->controls.stop) sonde_safety_trip(&session->safety, SONDE_FAULT_STOPPED);
   return sonde_session_create_recording(session, def, names, error);
@@ -102,7 +113,10 @@ static void release(sonde_session *session) {
   sonde_duplex_destroy(session->duplex);
   sonde_echo_destroy(session->echo);
   sonde_interior_destroy(session->interior);
+  sonde_leg_place_give_back(session->place);
   sonde_subject_destroy(session->subject);
+  sonde_free(session->solid_skin_m);
+  sonde_free(session->solid_pushes);
   sonde_free(session->line_m);
   sonde_free(session->line_coupling);
   sonde_free(session->touched);
@@ -229,5 +243,5 @@ uint64_t sonde_session_images(const sonde_session *session) {
 }
 
 uint64_t sonde_session_hash(sonde_session *session) {
-  return atomic_load(&session->loop) ? 0 : sonde_state_hash(session->state);
+  return atomic_load(&session->loop) ? 0 : sonde_subject_hash(session->subject);
 }

@@ -40,8 +40,9 @@ typedef struct sonde_surface_slot {
   sonde_pathology pathology; // of the controls, with the pressures of this tick
   sonde_circulation circulation;
   sonde_hand_moment hand;
-  double pose_s; // clock when the tick read its pose; 0 in lockstep
-  bool keyframe; // one was taken with it
+  struct sonde_leg_place *place; // of a solid; NULL: springs, or a solid at rest
+  double pose_s;                 // clock when the tick read its pose; 0 in lockstep
+  bool keyframe;                 // one was taken with it
 } sonde_surface_slot;
 
 // Bins of 0.25 ms; the last one holds all that is older.
@@ -99,7 +100,7 @@ struct sonde_session {
   uint32_t ticks_per_image;
   uint32_t image_width, image_height;
   size_t nodes;
-  size_t positions_at, forces_at, film_at, skin_at, pixels_at, colour_at,
+  size_t positions_at, forces_at, film_at, solid_at, skin_at, pixels_at, colour_at,
       spectrum_at; // offsets inside mailbox slots
 
   // tick
@@ -129,12 +130,15 @@ struct sonde_session {
   uint32_t *touched;               // [nodes] scratch
   sonde_findings findings;
   bool has_findings;
-  atomic_bool surface_pending;     // offered and not yet an image: real time offers no other
-  const void *surface;             // slot of the newest image
-  bool shown;                      // an image was made
-  sonde_session_beam beam, coming; // of the images; being built
-  bool building;                   // coming
-  uint32_t beam_images;            // since the building began
+  atomic_bool surface_pending; // offered and not yet an image: real time offers no other
+  const void *surface;         // slot of the newest image
+  const sonde_vec3 *skin_now_m, *pushes_n; // [nodes] of the newest image: its skin, what touches
+  sonde_vec3 *solid_skin_m, *solid_pushes; // [nodes] of a solid; NULL: springs
+  struct sonde_leg_place *place;           // whose tissue the interior borrows, NULL: none
+  bool shown;                              // an image was made
+  sonde_session_beam beam, coming;         // of the images; being built
+  bool building;                           // coming
+  uint32_t beam_images;                    // since the building began
   uint64_t shown_tick;
   _Atomic uint64_t images;
   uint64_t images_hash;                   // of all pixels so far, with a recording
@@ -167,9 +171,9 @@ struct sonde_session {
   // real time
   _Atomic(sonde_loop *) loop;
   sonde_loop_stats loop_stats; // of the last loop
-  pthread_t image_thread, record_thread;
-  bool image_running, record_running;
-  atomic_bool stop_image, stop_record;
+  pthread_t image_thread, record_thread, pass_thread, place_thread;
+  bool image_running, record_running, pass_running, place_running;
+  atomic_bool stop_image, stop_record, stop_solid;
 };
 
 // One tick, lockstep and real time alike (hot).
@@ -177,8 +181,9 @@ void sonde_session_step(sonde_session *session);
 // Body of the loop's tick (hot).
 void sonde_session_realtime_tick(void *session);
 // The same with recorded inputs instead of the device's (hot). @param controls NULL: as before
+// @param told bits of SONDE_LEG_ that the tick had
 void sonde_session_replay(sonde_session *session, const sonde_session_controls *controls,
-                          const sonde_device_sample *sample);
+                          const sonde_device_sample *sample, uint32_t told);
 // The multiple whose keyframe an image of this tick would be, 0: none is wanted (hot).
 uint64_t sonde_session_keyframe_tick(const sonde_session *session, uint64_t tick);
 // The surface and its snapshot into the mailbox of the image thread (hot).

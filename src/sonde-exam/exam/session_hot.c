@@ -26,7 +26,8 @@ static void step_world(sonde_session *session) {
 uint64_t sonde_session_keyframe_tick(const sonde_session *session, uint64_t tick) {
   uint64_t near = tick + 2 * (uint64_t)session->ticks_per_image - 1,
            period = session->keyframe_period;
-  bool touching = sonde_state_contact(session->state)->area_m2 > 0;
+  if (!sonde_subject_savable(session->subject)) return 0;
+  bool touching = sonde_subject_contact(session->subject)->area_m2 > 0;
   return touching || near / period % 2 == 0 ? near / period * period : 0;
 }
 
@@ -42,6 +43,12 @@ void sonde_session_offer(sonde_session *session) {
   sonde_surface_slot *head = (sonde_surface_slot *)(void *)slot;
   sonde_snapshot *snapshot = &head->snapshot;
   *snapshot = sonde_snapshot_of(session->state, session->sample.world_from_probe);
+  const sonde_contact *contact = sonde_subject_contact(session->subject);
+  snapshot->solid = session->subject->solid != NULL;
+  snapshot->force_n = contact->force_n;
+  snapshot->force_normal_n =
+      -v_dot(contact->force_n, q_rotate(snapshot->world_from_probe.rotation, vec3(0, 0, 1)));
+  snapshot->contact_volume_m3 = contact->volume_m3, snapshot->contact_area_m2 = contact->area_m2;
   snapshot->probe = session->controls.probe;
   snapshot->rendered_force_n = session->safety.force_n;
   snapshot->flags = sonde_subject_flags(session->subject);
@@ -69,6 +76,10 @@ void sonde_session_offer(sonde_session *session) {
   if (session->controls.gel)
     memcpy(slot + session->film_at, sonde_gel_film(session->subject->gel),
            session->nodes * sizeof(double));
+  head->place = NULL;
+  if (session->subject->solid)
+    head->place =
+        sonde_solid_leg_offer(session->subject->solid, (void *)(slot + session->solid_at));
   session->offered_tick = head->snapshot.tick;
   atomic_store_explicit(&session->surface_pending, true, memory_order_relaxed);
   sonde_mailbox_publish(session->surface_box);
@@ -105,15 +116,16 @@ void sonde_session_step(sonde_session *session) {
   sonde_safety_motion(&session->safety, sample.world_from_probe.position, session->dt_s);
   sample.world_from_probe =
       sonde_render_probe(&session->render, sample.world_from_probe,
-                         sonde_state_contact(session->state)->force_n, session->safety.force_n);
+                         sonde_subject_contact(session->subject)->force_n, session->safety.force_n);
   session->sample = sample;
   sonde_record record = {.tag = SONDE_RECORD_TICK, .tick = tick};
   record.sample = sample;
-  push(session, &record);
   step_world(session);
-  if (sonde_state_flags(session->state) & SONDE_FLAG_NON_FINITE)
+  record.did = session->subject->now.did;
+  push(session, &record);
+  if (sonde_subject_flags(session->subject) & SONDE_FLAG_NON_FINITE)
     sonde_safety_trip(&session->safety, SONDE_FAULT_NON_FINITE);
-  const sonde_contact *contact = sonde_state_contact(session->state);
+  const sonde_contact *contact = sonde_subject_contact(session->subject);
   sonde_render_force(&session->render, contact->force_n);
   sonde_vec3 torque = v_scale(contact->torque_n_m, session->render.def.force_scale);
   sonde_safety_apply(&session->safety, session->render.force_n, torque, session->dt_s);
@@ -138,13 +150,14 @@ void sonde_session_step(sonde_session *session) {
 }
 
 void sonde_session_replay(sonde_session *session, const sonde_session_controls *controls,
-                          const sonde_device_sample *sample) {
+                          const sonde_device_sample *sample, uint32_t told) {
   uint64_t tick = atomic_load_explicit(&session->ticks, memory_order_relaxed);
   if (controls) {
     session->controls = *controls;
     sonde_subject_control(session->subject, controls);
   }
   session->sample = *sample;
+  session->subject->told = told;
   step_world(session);
   SONDE_ASSERT(sonde_state_tick(session->state) == tick + 1);
   atomic_store_explicit(&session->ticks, tick + 1, memory_order_release);

@@ -42,9 +42,8 @@ static double couple(sonde_session *session, const unsigned char *slot) {
     session->line_m[l] = pose_apply(head->snapshot.world_from_probe, start);
   }
   sonde_gel_coupling_of(session->subject->gel, (const void *)(slot + session->film_at),
-                        session->touched, (const void *)(slot + session->positions_at),
-                        (const void *)(slot + session->forces_at), session->line_m, session->lines,
-                        session->line_coupling);
+                        session->touched, session->skin_now_m, session->pushes_n, session->line_m,
+                        session->lines, session->line_coupling);
   for (uint32_t l = 0; l < session->lines; ++l) sum += (double)session->line_coupling[l];
   sonde_echo_set_coupling(session->echo, session->line_coupling);
   return sum / session->lines;
@@ -59,6 +58,34 @@ static sonde_duplex_moment duplex_moment(const sonde_session *session,
                                .hand = head->hand};
 }
 
+// A leg of which nothing is moved.
+static sonde_vec3 not_moved(const sonde_interior_tissue *self, sonde_vec3 rest_m) {
+  (void)self, (void)rest_m;
+  return vec3(0, 0, 0);
+}
+static sonde_mat3 not_stressed(const sonde_interior_tissue *self, sonde_vec3 rest_m) {
+  (void)self, (void)rest_m;
+  return m_zero();
+}
+static const sonde_interior_tissue at_rest = {not_moved, not_stressed};
+
+// The skin of the surface; of a solid also its tissue.
+static const sonde_interior_tissue *find_skin(sonde_session *session, const unsigned char *slot) {
+  const sonde_surface_slot *head = (const void *)slot;
+  session->skin_now_m = (const void *)(slot + session->positions_at);
+  session->pushes_n = (const void *)(slot + session->forces_at);
+  if (!session->solid_skin_m) return NULL;
+  memcpy(session->solid_skin_m, session->skin_now_m, session->nodes * sizeof(sonde_vec3));
+  memset(session->solid_pushes, 0, session->nodes * sizeof(sonde_vec3));
+  session->skin_now_m = session->solid_skin_m, session->pushes_n = session->solid_pushes;
+  if (!head->place) return &at_rest;
+  const sonde_interior_tissue *tissue =
+      sonde_leg_place_tissue(head->place, (const void *)(slot + session->solid_at));
+  sonde_leg_place_skin(head->place, head->snapshot.world_from_probe, session->solid_skin_m,
+                       session->solid_pushes);
+  return tissue;
+}
+
 bool sonde_session_follow(sonde_session *session) {
   const unsigned char *slot = sonde_mailbox_read(session->surface_box);
   if (!slot) return false;
@@ -70,6 +97,9 @@ bool sonde_session_follow(sonde_session *session) {
     sonde_session_remember_image(session, &part->memory);
     sonde_mailbox_publish(session->inside_box);
   }
+  sonde_leg_place *before = session->place;
+  const sonde_interior_tissue *tissue = find_skin(session, slot);
+  session->place = head->place;
   if (session->interior) {
     // Another vein than the last image's starts in equilibrium; the same one in motion or under
     // another pressure goes on from its last state.
@@ -87,6 +117,7 @@ bool sonde_session_follow(sonde_session *session) {
         .face_half_x_m = session->probes[head->snapshot.probe].half_x_m,
         .face_half_y_m = session->probes[head->snapshot.probe].half_y_m,
         .posture = head->controls.posture,
+        .tissue = tissue,
     };
     sonde_interior_update(session->interior, &input);
     const sonde_duplex_moment moment = duplex_moment(session, head);
@@ -95,6 +126,7 @@ bool sonde_session_follow(sonde_session *session) {
     session->shown_tick = head->snapshot.tick;
     session->shown_pathology = *pathology;
   }
+  sonde_leg_place_give_back(before); // the interior has let go of its tissue
   // A new beam is built over several images, which go on with the old one: none of them comes late.
   // One under way is finished first, so that a slider that keeps moving shows where it has been.
   // The number of images is the same for every beam, whatever was built before: a replay that
@@ -139,7 +171,7 @@ void sonde_session_draw(sonde_session *session) {
   unsigned char *out = (unsigned char *)frame;
   const sonde_surface_slot *head = (const void *)session->surface;
   // The skin in single precision.
-  const double *positions_m = (const void *)(session->surface + session->positions_at);
+  const double *positions_m = &session->skin_now_m->x;
   float *skin_m = (float *)(void *)(out + session->skin_at);
   for (size_t i = 0; i < 3 * session->nodes; ++i) skin_m[i] = (float)positions_m[i];
   sonde_image image = {.width = session->image_width,

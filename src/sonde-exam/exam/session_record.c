@@ -153,7 +153,7 @@ sonde_status sonde_session_finish(sonde_session *session, sonde_error *error) {
   sonde_session_stop(session);
   if (!session->recorder) return SONDE_OK;
   if (!session->ended) {
-    session->end = (sonde_record_end){.hash = sonde_state_hash(session->state),
+    session->end = (sonde_record_end){.hash = sonde_subject_hash(session->subject),
                                       .lost = atomic_load(&session->lost_records),
                                       .image_hash = session->images_hash};
     sonde_recorder_end(session->recorder, &session->end);

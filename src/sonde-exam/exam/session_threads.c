@@ -24,6 +24,24 @@ static void *record_main(void *argument) {
   return NULL;
 }
 
+// Passes of the solid, and the places that come: one looks as often as ticks come, the other as
+// often as passes do.
+static void *pass_main(void *argument) {
+  sonde_session *session = argument;
+  while (!atomic_load_explicit(&session->stop_solid, memory_order_acquire))
+    if (!sonde_solid_leg_work(session->subject->solid))
+      sonde_clock_sleep_until(sonde_clock_now() + 0.5e-3);
+  return NULL;
+}
+
+static void *place_main(void *argument) {
+  sonde_session *session = argument;
+  while (!atomic_load_explicit(&session->stop_solid, memory_order_acquire))
+    if (!sonde_solid_leg_build(session->subject->solid))
+      sonde_clock_sleep_until(sonde_clock_now() + 10e-3);
+  return NULL;
+}
+
 static sonde_status launch(pthread_t *thread, void *(*body)(void *), sonde_session *session,
                            bool *running, sonde_error *error) {
   int failure = pthread_create(thread, NULL, body, session);
@@ -39,6 +57,7 @@ sonde_status sonde_session_start(sonde_session *session, sonde_error *error) {
   if (atomic_load(&session->loop)) return SONDE_OK;
   atomic_store(&session->stop_image, false);
   atomic_store(&session->stop_record, false);
+  atomic_store(&session->stop_solid, false);
   session->last_tick_s = 0.0;
   session->realtime = true;
   sonde_loop *loop = NULL;
@@ -46,6 +65,11 @@ sonde_status sonde_session_start(sonde_session *session, sonde_error *error) {
       launch(&session->image_thread, image_main, session, &session->image_running, error);
   if (!status && session->recorder)
     status = launch(&session->record_thread, record_main, session, &session->record_running, error);
+  if (!status && session->subject->solid) {
+    status = launch(&session->pass_thread, pass_main, session, &session->pass_running, error);
+    if (!status)
+      status = launch(&session->place_thread, place_main, session, &session->place_running, error);
+  }
   if (!status)
     status = sonde_loop_start(session->dt_s, sonde_session_realtime_tick, session, &loop, error);
   atomic_store(&session->loop, loop);
@@ -59,6 +83,10 @@ void sonde_session_stop(sonde_session *session) {
   if (loop) sonde_loop_stop(loop, &session->loop_stats);
   atomic_store(&session->stop_image, true);
   atomic_store(&session->stop_record, true);
+  atomic_store(&session->stop_solid, true);
+  if (session->pass_running) pthread_join(session->pass_thread, NULL);
+  if (session->place_running) pthread_join(session->place_thread, NULL);
+  session->pass_running = session->place_running = false;
   if (session->image_running) pthread_join(session->image_thread, NULL);
   if (session->record_running) pthread_join(session->record_thread, NULL);
   session->image_running = session->record_running = false;
@@ -71,8 +99,25 @@ void sonde_session_stop(sonde_session *session) {
 void sonde_session_tick(sonde_session *session) {
   SONDE_ASSERT(!atomic_load(&session->loop));
   sonde_session_step(session);
+  if (session->subject->solid)
+    sonde_solid_leg_await(session->subject->solid, SONDE_LEG_PASS | SONDE_LEG_PLACE);
   sonde_session_show(session);
   sonde_session_drain(session);
+}
+
+sonde_session_solid_counts sonde_session_solid_count(const sonde_session *session) {
+  SONDE_ASSERT(!atomic_load(&session->loop));
+  if (!session->subject->solid) return (sonde_session_solid_counts){0};
+  const sonde_leg_counts c = sonde_solid_leg_count(session->subject->solid);
+  return (sonde_session_solid_counts){.passes = c.passes,
+                                      .factors = c.factors,
+                                      .late = c.late,
+                                      .places = c.places,
+                                      .refused = c.refused,
+                                      .pass_mean_s = c.passes ? c.pass_s / (double)c.passes : 0,
+                                      .pass_most_s = c.pass_most_s,
+                                      .build_s = c.build_s,
+                                      .handed_over_n = c.handed_over_n};
 }
 
 sonde_loop_stats sonde_session_loop(const sonde_session *session) {

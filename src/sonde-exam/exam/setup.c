@@ -8,10 +8,12 @@
 #include <string.h>
 
 enum { MOST_NUMBERS = 16 };
+static const char *const LAYERS[SONDE_SOLID_LAYERS] = {SONDE_SOLID_LAYER_NAMES};
 
 sonde_setup sonde_setup_default(void) {
   return (sonde_setup){.friction = sonde_world_def_default().friction,
-                       .circulation = sonde_circulation_default()};
+                       .circulation = sonde_circulation_default(),
+                       .solid = sonde_session_solid_default()};
 }
 
 sonde_setup sonde_setup_of(const sonde_session_def *def) {
@@ -22,6 +24,8 @@ sonde_setup sonde_setup_of(const sonde_session_def *def) {
                        .circulation = def->circulation,
                        .scans = def->scanner != NULL};
   if (def->scanner) setup.scanner = *def->scanner;
+  setup.is_solid = def->solid != NULL;
+  if (def->solid) setup.solid = *def->solid;
   memcpy(setup.presets, def->presets, sizeof setup.presets);
   return setup;
 }
@@ -35,6 +39,7 @@ void sonde_setup_apply(const sonde_setup *setup, sonde_session_def *def) {
   def->circulate = setup->circulate;
   def->circulation = setup->circulation;
   def->scanner = setup->scans ? &setup->scanner : NULL;
+  def->solid = setup->is_solid ? &setup->solid : NULL;
 }
 
 // A number by name. NaN and infinity have no JSON: they are left out, and read as NaN.
@@ -73,6 +78,13 @@ static uint32_t list_circulation(number *list, sonde_circulation *c) {
   return SONDE_COUNT_OF(own);
 }
 
+static uint32_t list_layer(number *list, sonde_hyperelastic *layer) {
+  const number own[] = {
+      {"shear_pa", &layer->shear_pa}, {"exponent", &layer->exponent}, {"bulk_pa", &layer->bulk_pa}};
+  memcpy(list, own, sizeof own);
+  return SONDE_COUNT_OF(own);
+}
+
 static void write_list(sonde_json_out *out, const number *list, uint32_t count) {
   for (uint32_t i = 0; i < count; ++i)
     if (isfinite(*list[i].value)) sonde_json_put_real(out, list[i].key, *list[i].value, 17);
@@ -104,6 +116,17 @@ void sonde_setup_write(sonde_json_out *header, const sonde_setup *setup) {
     sonde_json_begin_object(header, "circulation");
     sonde_json_put_integer(header, "posture", s.circulation.posture);
     write_list(header, list, list_circulation(list, &s.circulation));
+    sonde_json_end(header);
+  }
+  if (s.is_solid) {
+    sonde_json_begin_object(header, "solid");
+    sonde_json_put_real(header, "edge_m", s.solid.edge_m, 17);
+    for (int k = 0; k < SONDE_SOLID_LAYERS; ++k) {
+      sonde_json_begin_object(header, LAYERS[k]);
+      sonde_json_put_integer(header, "energy", s.solid.layer[k].energy);
+      write_list(header, list, list_layer(list, &s.solid.layer[k]));
+      sonde_json_end(header);
+    }
     sonde_json_end(header);
   }
   if (s.scans) {
@@ -162,6 +185,16 @@ bool sonde_setup_read(const sonde_json *header, sonde_setup *setup) {
     snprintf(preset->name, sizeof preset->name, "%.60s", name ? name : "");
     read_list(item, list, list_preset(list, preset));
     if (sonde_preset_apply(preset, NULL, NULL, NULL)) return false;
+  }
+  const sonde_json *solid = sonde_json_member(object, "solid");
+  setup->is_solid = solid != NULL;
+  if (solid) setup->solid.edge_m = sonde_json_as_number(sonde_json_member(solid, "edge_m"));
+  for (int k = 0; k < SONDE_SOLID_LAYERS && solid; ++k) { // a session checks their ranges
+    const sonde_json *layer = sonde_json_member(solid, LAYERS[k]);
+    const double energy = sonde_json_as_number(sonde_json_member(layer, "energy"));
+    if (!(energy >= 0 && energy <= SONDE_ENERGY_FUNG)) return false;
+    setup->solid.layer[k].energy = (sonde_strain_energy)(int)energy;
+    read_list(layer, list, list_layer(list, &setup->solid.layer[k]));
   }
   const sonde_json *scanner = sonde_json_member(object, "scanner");
   setup->scans = scanner != NULL;

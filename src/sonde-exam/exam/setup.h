@@ -4,7 +4,7 @@
 
 #include "sonde/base_json.h"
 #include "sonde/echo_scanner.h"
-#include "sonde/exam.h"
+#include "sonde/exam_solid.h"
 
 // What holds for a whole session.
 typedef struct sonde_setup {
@@ -16,11 +16,14 @@ typedef struct sonde_setup {
   sonde_circulation circulation;
   bool scans; // the scanner below makes the pictures, else the plain one
   sonde_scanner scanner;
+  bool is_solid; // the solid below bears the probe, else springs
+  sonde_session_solid solid;
 } sonde_setup;
 
 sonde_setup sonde_setup_default(void);
 sonde_setup sonde_setup_of(const sonde_session_def *def);
-// Into the definition of a session that is to start alike; `def` borrows the scanner of `setup`.
+// Into the definition of a session that is to start alike; `def` borrows scanner and solid of
+// `setup`.
 void sonde_setup_apply(const sonde_setup *setup, sonde_session_def *def);
 // Adds "setup" to the header of a recording. @thread owner
 void sonde_setup_write(sonde_json_out *header, const sonde_setup *setup);

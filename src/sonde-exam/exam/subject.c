@@ -61,8 +61,42 @@ sonde_status sonde_subject_create(const sonde_setup *setup, const sonde_model *m
   return SONDE_OK;
 }
 
+sonde_session_solid sonde_session_solid_default(void) {
+  const sonde_solid_leg_def def = sonde_solid_leg_def_default();
+  sonde_session_solid solid = {.version = SONDE_DEF_VERSION, .edge_m = def.mesh.edge_m};
+  memcpy(solid.layer, def.live.solid.layer, sizeof solid.layer);
+  return solid;
+}
+
+sonde_status sonde_subject_give_solid(sonde_subject *subject, const sonde_interior *interior,
+                                      const sonde_probe *probes, uint32_t probe_count,
+                                      sonde_error *error) {
+  SONDE_ASSERT(subject->setup.is_solid && !subject->solid && !subject->now.placed);
+  const sonde_session_solid *solid = &subject->setup.solid;
+  sonde_status status = sonde_def_check("a session's solid", solid->version, error);
+  if (!status && subject->setup.preset_count > 0)
+    status = sonde_fail(error, SONDE_ARGUMENT,
+                        "the hyperelastic solid goes without presets, which "
+                        "are of the springs");
+  if (!status && fabs(subject->dt_s - 1e-3) > 1e-9)
+    status =
+        sonde_fail(error, SONDE_ARGUMENT,
+                   "ticks of %g s: the hyperelastic solid has those of 0.001 s", subject->dt_s);
+  const sonde_bounded range = {"edge_m", solid->edge_m, 5e-3, 20e-3};
+  if (!status) status = sonde_bounded_check(&range, 1, error);
+  if (status) return status;
+  sonde_solid_leg_def def = sonde_solid_leg_def_default();
+  def.model = subject->model, def.columns = interior, def.skin = subject->rest_skin;
+  def.probes = subject->probes = probes, def.probe_count = probe_count;
+  def.mesh.edge_m = solid->edge_m;
+  memcpy(def.live.solid.layer, solid->layer, sizeof solid->layer);
+  subject->told = SONDE_LEG_AS_DONE;
+  return sonde_solid_leg_create(&def, &subject->solid, error);
+}
+
 void sonde_subject_destroy(sonde_subject *subject) {
   if (!subject) return;
+  sonde_solid_leg_destroy(subject->solid);
   sonde_surface_index_destroy(subject->rest_skin);
   sonde_gel_destroy(subject->gel);
   sonde_state_destroy(subject->state);
@@ -83,5 +117,10 @@ sonde_status sonde_subject_recall(sonde_subject *subject, const void *saved, siz
         (!moment.placed || sonde_pose_usable(moment.pose))))
     return sonde_fail(error, SONDE_FORMAT, "the saved moment is damaged");
   sonde_subject_restore(subject, saved);
+  subject->felt = (sonde_contact){0};
+  if (subject->solid) {
+    const sonde_status status = sonde_solid_leg_recall(subject->solid, &moment.rest, error);
+    if (status) return status;
+  }
   return sonde_state_restore(subject->state, (const char *)saved + own, bytes - own, error);
 }

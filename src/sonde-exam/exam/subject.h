@@ -5,6 +5,7 @@
 
 #include "exam/duplex.h"
 #include "exam/setup.h"
+#include "solid/leg.h"
 #include "sonde/haptics_gel.h"
 
 enum { SONDE_GEL_TICKS = 20 }; // of a step of the film, a part of it per tick
@@ -22,6 +23,11 @@ typedef struct sonde_subject_moment {
   bool off;          // the probe is taken off until it has left the body
   uint32_t restores; // times the skin was restored to rest for it
   uint64_t off_tick; // last tick without the probe
+  // of a solid
+  uint32_t did;          // bits of SONDE_LEG_ in the last tick
+  bool broken;           // its force was not finite
+  uint64_t felt_hash;    // of all that it has exerted
+  sonde_leg_moment rest; // where a saved moment goes on
 } sonde_subject_moment;
 
 typedef struct sonde_subject {
@@ -30,6 +36,10 @@ typedef struct sonde_subject {
   double dt_s;
   sonde_state *state;
   sonde_gel *gel;
+  sonde_solid_leg *solid;    // NULL: springs
+  const sonde_probe *probes; // of the solid
+  uint32_t told;             // bits of SONDE_LEG_: what its ticks take over
+  sonde_contact felt;        // of it on the probe
   sonde_surface_index *rest_skin;
   sonde_subject_moment now;
 } sonde_subject;
@@ -40,10 +50,22 @@ sonde_status sonde_subject_create(const sonde_setup *setup, const sonde_model *m
                                   const sonde_session_controls *controls, sonde_subject **subject,
                                   sonde_error *error);
 void sonde_subject_destroy(sonde_subject *subject);
+// The setup's solid bears these probes in place of the springs; interior (NULL: the model has no
+// bone) and probes are borrowed. Before any step.
+// @return ARGUMENT for what a solid does not have, MEMORY @thread owner
+sonde_status sonde_subject_give_solid(sonde_subject *subject, const sonde_interior *interior,
+                                      const sonde_probe *probes, uint32_t probe_count,
+                                      sonde_error *error);
 // Other controls from the next step on. @thread tick
 void sonde_subject_control(sonde_subject *subject, const sonde_session_controls *controls);
 // One tick of world and gel. A probe that is led where no press leads is taken off. @thread tick
 void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_pose pose);
+// What the probe feels: springs or solid. @thread tick
+const sonde_contact *sonde_subject_contact(const sonde_subject *subject);
+// Whether a moment can be saved now. A solid can while nothing loads it. @thread tick
+bool sonde_subject_savable(const sonde_subject *subject);
+// sonde_state_hash(), with all that a solid has exerted. @thread owner
+uint64_t sonde_subject_hash(const sonde_subject *subject);
 // Flags of the last step; INSIDE_OUT also while the probe is off and for half a second afterwards,
 // so that a viewer of some of the ticks sees it. @thread tick
 uint32_t sonde_subject_flags(const sonde_subject *subject);
@@ -66,7 +88,7 @@ void sonde_subject_restore(sonde_subject *subject, const void *saved);
 // aligned to 8 bytes @return bytes @thread tick
 size_t sonde_subject_size(const sonde_subject *subject);
 size_t sonde_subject_remember(const sonde_subject *subject, void *out);
-// sonde_state_hash() of a remembered moment. @thread any
+// sonde_subject_hash() of a remembered moment. @thread any
 uint64_t sonde_subject_saved_hash(const sonde_subject *subject, const void *saved);
 // Goes on from there. @return FORMAT, MISMATCH: then it stands somewhere between @thread owner
 sonde_status sonde_subject_recall(sonde_subject *subject, const void *saved, size_t bytes,

@@ -8,6 +8,7 @@
 
 #include <string.h>
 
+static const double off_m = 0.2; // a probe that is taken off, from the skin
 static const double portion_m3 = 2e-6, portion_radius_m = 0.015;
 
 static void apply_tissue(sonde_subject *subject) {
@@ -71,13 +72,30 @@ void sonde_subject_step(sonde_subject *subject, const sonde_probe *probe, sonde_
   bool off = sonde_subject_guard(subject, probe, pose);
   now->pose = pose;
   now->placed = true;
-  sonde_step(subject->state, off ? NULL : probe, pose);
+  sonde_step(subject->state, off || subject->solid ? NULL : probe, pose);
   now->carried = sonde_state_flags(subject->state) & SONDE_FLAG_INSIDE_OUT;
+  if (subject->solid) {
+    // A probe that is taken off leaves the skin along its axis.
+    sonde_solid_contact contact;
+    sonde_pose at = pose;
+    if (off) at.position = v_madd(pose.position, -off_m, q_rotate(pose.rotation, vec3(0, 0, 1)));
+    now->did = sonde_solid_leg_tick(subject->solid, (uint32_t)(probe - subject->probes), at,
+                                    subject->told, &contact);
+    now->broken = !v_finite(contact.force_n) || !v_finite(contact.torque_nm);
+    if (now->broken) contact = (sonde_solid_contact){0};
+    subject->felt.force_n = contact.force_n, subject->felt.torque_n_m = contact.torque_nm;
+    subject->felt.reaction_n = v_scale(contact.force_n, -1);
+    subject->felt.area_m2 = contact.area_m2;
+    const double felt[] = {
+        contact.force_n.x,   contact.force_n.y,   contact.force_n.z, contact.torque_nm.x,
+        contact.torque_nm.y, contact.torque_nm.z, now->did};
+    now->felt_hash = sonde_hash(now->felt_hash, felt, sizeof felt);
+  }
   if (now->controls.gel) {
     uint32_t part = (uint32_t)((sonde_state_tick(subject->state) - 1) % SONDE_GEL_TICKS);
     sonde_gel_part(subject->gel, sonde_state_contact_forces(subject->state), subject->now.drift_m_s,
                    SONDE_GEL_TICKS * subject->dt_s, part, SONDE_GEL_TICKS);
-    bool touching = sonde_state_contact(subject->state)->area_m2 > 0;
+    bool touching = sonde_subject_contact(subject)->area_m2 > 0;
     if (part + 1 == SONDE_GEL_TICKS || touching != subject->now.touching) apply_friction(subject);
     subject->now.touching = touching;
   }
@@ -96,7 +114,11 @@ size_t sonde_subject_save(const sonde_subject *subject, void *out) {
   const sonde_gel *gel = subject->gel;
   const double *const arrays[] = {gel->film_m, gel->moisture, gel->change_m3, gel->push_pa};
   char *to = out;
-  if (out) memcpy(to, &subject->now, sizeof subject->now);
+  if (out) {
+    sonde_subject_moment now = subject->now;
+    if (subject->solid) (void)sonde_solid_leg_remember(subject->solid, &now.rest);
+    memcpy(to, &now, sizeof now);
+  }
   for (size_t k = 0; out && k < SONDE_COUNT_OF(arrays); ++k)
     memcpy(to + sizeof subject->now + k * bytes, arrays[k], bytes);
   return sizeof subject->now + SONDE_COUNT_OF(arrays) * bytes;
@@ -126,5 +148,22 @@ size_t sonde_subject_remember(const sonde_subject *subject, void *out) {
 
 uint64_t sonde_subject_saved_hash(const sonde_subject *subject, const void *saved) {
   size_t own = sonde_subject_save(subject, NULL);
-  return sonde_state_saved_hash(subject->model, (const char *)saved + own);
+  sonde_subject_moment moment;
+  memcpy(&moment, saved, sizeof moment);
+  const uint64_t hash = sonde_state_saved_hash(subject->model, (const char *)saved + own);
+  return subject->solid ? sonde_hash(hash, &moment.felt_hash, sizeof moment.felt_hash) : hash;
+}
+
+uint64_t sonde_subject_hash(const sonde_subject *subject) {
+  const uint64_t hash = sonde_state_hash(subject->state), felt = subject->now.felt_hash;
+  return subject->solid ? sonde_hash(hash, &felt, sizeof felt) : hash;
+}
+
+const sonde_contact *sonde_subject_contact(const sonde_subject *subject) {
+  return subject->solid ? &subject->felt : sonde_state_contact(subject->state);
+}
+
+bool sonde_subject_savable(const sonde_subject *subject) {
+  sonde_leg_moment moment;
+  return !subject->solid || sonde_solid_leg_remember(subject->solid, &moment);
 }

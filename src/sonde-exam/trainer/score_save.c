@@ -19,13 +19,15 @@ static void put_score(sonde_json_out *out, const sonde_exam_report *exam) {
   const sonde_score *s = exam->score;
   const sonde_score_note *note = &exam->note;
   sonde_json_begin_object(out, "exam");
-  const char *const about[][2] = {{"exam", note->exam},
-                                  {"date", note->date},
-                                  {"trainee", note->trainee},
-                                  {"case", exam->patient->id},
-                                  {"title", exam->patient->title},
-                                  {"protocol", note->protocol},
-                                  {"guidance", note->guidance}};
+  const char *const about[][2] = {
+      {"exam", note->exam},
+      {"date", note->date},
+      {"trainee", note->trainee},
+      {"case", exam->patient->id},
+      {"title", exam->patient->title},
+      {"protocol", note->protocol},
+      {"guidance", note->guidance},
+      {"tissue", note->tissue && note->tissue[0] ? note->tissue : "springs"}};
   for (size_t i = 0; i < SONDE_COUNT_OF(about); ++i)
     sonde_put_text_or_null(out, about[i][0], about[i][1]);
   sonde_json_end(out);

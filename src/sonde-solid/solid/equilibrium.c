@@ -23,7 +23,7 @@ sonde_equilibrium_def sonde_equilibrium_def_default(void) {
   return def;
 }
 
-static sonde_status check(const sonde_equilibrium_def *def, sonde_error *error) {
+sonde_status sonde_equilibrium_check(const sonde_equilibrium_def *def, sonde_error *error) {
   sonde_status status = sonde_def_check("an equilibrium", def->version, error);
   static const char *const NAMES[] = {"muscle", "fat", "skin"};
   for (int k = 0; k < SONDE_SOLID_LAYERS && !status; ++k) {
@@ -127,7 +127,7 @@ sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_z
                                     .element_count = mesh->count,
                                     .elements = (const uint32_t(*)[8])e->corner};
     status = sonde_symbolic_create(&how, &e->symbolic, error);
-    if (!status) status = sonde_numeric_reserve(&e->numeric, e->symbolic, error);
+    if (!status && !e->patch_count) status = sonde_numeric_reserve(&e->numeric, e->symbolic, error);
   }
   sonde_free(points);
 done:
@@ -170,7 +170,7 @@ sonde_status sonde_equilibrium_place(const sonde_hexes *mesh, const sonde_probe 
                                      sonde_error *error) {
   SONDE_ASSERT(mesh != NULL && probe != NULL && equilibrium != NULL);
   *equilibrium = NULL;
-  sonde_status status = check(def, error);
+  sonde_status status = sonde_equilibrium_check(def, error);
   if (status) return status;
   const bool ball = probe->ball_radius_m > 0;
   // Lines of nodes along the footprint's border belong to it, though the skin's curvature moves

@@ -24,7 +24,7 @@ struct sonde_equilibrium {
   uint32_t zone_faces;   //
   sonde_stick *stick;    // [zone_faces * SONDE_TOUCH_POINTS] NULL: without friction
   sonde_symbolic *symbolic;
-  sonde_numeric numeric;
+  sonde_numeric numeric;            // of a solid with a patch, which has its own, only the kernels
   sonde_vec3 *moved, *trial, *kept; // [node_count] displacements: state, of a line search, before
   double *force, *step;             // [3 unknown_count]
   double *schur, *matrix;           // [side * side], side = 3 zone_count
@@ -43,6 +43,8 @@ static inline uint32_t sonde_patch_first(const sonde_equilibrium *e) {
 }
 
 enum { SONDE_IN_ZONE = 1, SONDE_IN_PATCH = 2 };
+// @return ARGUMENT naming the value out of range
+sonde_status sonde_equilibrium_check(const sonde_equilibrium_def *def, sonde_error *error);
 // Makes the equilibrium of these nodes: in_zone [node_count], others 0. Nothing is imposed.
 sonde_status sonde_equilibrium_make(const sonde_hexes *mesh, const uint8_t *in_zone,
                                     const sonde_equilibrium_def *def,

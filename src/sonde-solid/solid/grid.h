@@ -39,6 +39,9 @@ static inline uint32_t sonde_grid_shape_node(const sonde_grid_shape *s, uint32_t
   return (level * s->u_count + u % s->u_count) * s->v_count + v;
 }
 
+// The ring of a leg whose columns an interior has, of which only what does not move is read.
+sonde_status sonde_hexes_ring_of(const sonde_interior *interior, const sonde_site *site,
+                                 const sonde_hexes_def *def, sonde_hexes *mesh, sonde_error *error);
 // Nodes, hexahedra, layers and skin; nothing is held but the base. @return MEMORY, MESH for a
 // hexahedron that is folded
 sonde_status sonde_hexes_bend(const sonde_grid_shape *shape, sonde_hexes *mesh, sonde_error *error);

@@ -1,10 +1,9 @@
 // What a state of the solid does to points of the leg: displacement and stress anywhere, for the
 // interior. Points beside the hexahedra take what the nearest skin or bone has.
-#include "equilibrium.h"
+#include "inside.h"
 
 #include "base/base.h"
 #include "elements/hexahedron.h"
-#include "sonde/interior.h"
 
 #include <string.h>
 
@@ -15,6 +14,8 @@ typedef struct solid_tissue {
   const sonde_hexes *mesh;
   sonde_vec3 *moved;        // [nodes] displacements
   sonde_mat3 (*stress)[8];  // [hexes] at the corners, of the hexahedron's layer
+  sonde_mat3 *middle, *sum; // [hexes] stress in their middles, [nodes]
+  uint32_t *beside;         // [nodes] hexahedra of a layer
   sonde_vec3 (*box)[2];     // [hexes] lowest and highest coordinates
   sonde_vec3 low, step;     // of the bins
   uint32_t *first, *listed; // [BINS^3 + 1], hexahedra of a bin
@@ -82,19 +83,14 @@ bool sonde_equilibrium_at(const sonde_equilibrium *e, sonde_vec3 rest_m,
 
 // ---- reading ------------------------------------------------------------------------------
 
-// What a point shares in: corners of hexahedra (8 hexahedron + corner).
-typedef struct shares {
-  uint32_t count, corner[8];
-  double weight[8];
-} shares;
-
 static uint32_t bin_of(const solid_tissue *t, sonde_vec3 p, int axis) {
   const double at = (v_coordinate(p, axis) - v_coordinate(t->low, axis));
   return (uint32_t)clamp(floor(at / v_coordinate(t->step, axis)), 0, BINS - 1);
 }
 
-static shares shares_of(const solid_tissue *t, sonde_vec3 p) {
-  shares s = {.count = 8};
+sonde_tissue_shares sonde_solid_tissue_shares(const sonde_interior_tissue *tissue, sonde_vec3 p) {
+  const solid_tissue *t = (const solid_tissue *)tissue;
+  sonde_tissue_shares s = {.count = 8};
   const uint32_t bin = (bin_of(t, p, 0) * BINS + bin_of(t, p, 1)) * BINS + bin_of(t, p, 2);
   for (uint32_t k = t->first[bin]; k < t->first[bin + 1]; ++k) {
     const uint32_t hex = t->listed[k];
@@ -112,18 +108,23 @@ static shares shares_of(const solid_tissue *t, sonde_vec3 p) {
   return s;
 }
 
-static sonde_vec3 moved_at(const sonde_interior_tissue *self, sonde_vec3 rest_m) {
-  const solid_tissue *t = (const solid_tissue *)self;
-  const shares s = shares_of(t, rest_m);
+sonde_vec3 sonde_solid_tissue_moved(const sonde_interior_tissue *tissue,
+                                    const sonde_tissue_shares *s) {
+  const solid_tissue *t = (const solid_tissue *)tissue;
   sonde_vec3 sum = vec3(0, 0, 0);
-  for (uint32_t k = 0; k < s.count; ++k)
-    sum = v_madd(sum, s.weight[k], t->moved[t->mesh->corner[s.corner[k] / 8][s.corner[k] % 8]]);
+  for (uint32_t k = 0; k < s->count; ++k)
+    sum = v_madd(sum, s->weight[k], t->moved[t->mesh->corner[s->corner[k] / 8][s->corner[k] % 8]]);
   return sum;
+}
+
+static sonde_vec3 moved_at(const sonde_interior_tissue *self, sonde_vec3 rest_m) {
+  const sonde_tissue_shares s = sonde_solid_tissue_shares(self, rest_m);
+  return sonde_solid_tissue_moved(self, &s);
 }
 
 static sonde_mat3 stress_at(const sonde_interior_tissue *self, sonde_vec3 rest_m) {
   const solid_tissue *t = (const solid_tissue *)self;
-  const shares s = shares_of(t, rest_m);
+  const sonde_tissue_shares s = sonde_solid_tissue_shares(self, rest_m);
   sonde_mat3 sum = m_zero();
   for (uint32_t k = 0; k < s.count; ++k)
     sum = m_add(sum, m_scale(t->stress[s.corner[k] / 8][s.corner[k] % 8], s.weight[k]));
@@ -133,14 +134,14 @@ static sonde_mat3 stress_at(const sonde_interior_tissue *self, sonde_vec3 rest_m
 // ---- making -------------------------------------------------------------------------------
 
 // Cauchy stress in the middle of a hexahedron, its pressure by the mean ratio of its volume.
-static sonde_mat3 stress_of(const sonde_equilibrium *e, uint32_t hex) {
+static sonde_mat3 stress_of(const sonde_equilibrium *e, const sonde_vec3 *moved, uint32_t hex) {
   const sonde_hyperelastic *material = &e->def.layer[e->mesh->layer[hex]];
   sonde_vec3 rest[8], now[8], g[8];
   sonde_mat3 f = m_zero(), stress = m_zero();
   double volume[2] = {0, 0}, stretch2[3], vector[3][3];
   for (int c = 0; c < 8; ++c) {
     rest[c] = e->mesh->node[e->mesh->corner[hex][c]];
-    now[c] = v_add(rest[c], e->moved[e->mesh->corner[hex][c]]);
+    now[c] = v_add(rest[c], moved[e->mesh->corner[hex][c]]);
   }
   for (int p = 0; p < 8; ++p) {
     const sonde_vec3 at = v_scale(
@@ -166,32 +167,29 @@ static sonde_mat3 stress_of(const sonde_equilibrium *e, uint32_t hex) {
   return stress;
 }
 
-// Means at the nodes, each layer for itself: hexahedra of constant pressure carry a chequered one.
-static sonde_status find_stress(solid_tissue *t, const sonde_equilibrium *e, sonde_error *error) {
+// Stress: means at the nodes, each layer for itself: hexahedra of constant pressure carry a
+// chequered one.
+void sonde_solid_tissue_fill(sonde_interior_tissue *tissue, const sonde_equilibrium *e,
+                             const sonde_vec3 *moved) {
+  solid_tissue *t = (solid_tissue *)tissue;
   const sonde_hexes *mesh = t->mesh;
-  sonde_mat3 *middle = SONDE_NEW(sonde_mat3, mesh->count), *sum = NULL;
-  uint32_t *count = SONDE_NEW(uint32_t, mesh->node_count);
-  sum = SONDE_NEW(sonde_mat3, mesh->node_count);
-  const bool all = middle && count && sum;
-  for (uint32_t h = 0; h < mesh->count && all; ++h) middle[h] = stress_of(e, h);
-  for (int layer = 0; layer < SONDE_SOLID_LAYERS && all; ++layer) {
-    memset(sum, 0, mesh->node_count * sizeof *sum);
-    memset(count, 0, mesh->node_count * sizeof *count);
+  SONDE_ASSERT(mesh == e->mesh && moved != NULL);
+  memcpy(t->moved, moved, mesh->node_count * sizeof *t->moved);
+  for (uint32_t h = 0; h < mesh->count; ++h) t->middle[h] = stress_of(e, moved, h);
+  for (int layer = 0; layer < SONDE_SOLID_LAYERS; ++layer) {
+    memset(t->sum, 0, mesh->node_count * sizeof *t->sum);
+    memset(t->beside, 0, mesh->node_count * sizeof *t->beside);
     for (uint32_t k = 0; k < 8 * mesh->count; ++k) {
       if (mesh->layer[k / 8] != layer) continue;
       const uint32_t node = mesh->corner[k / 8][k % 8];
-      sum[node] = m_add(sum[node], middle[k / 8]), ++count[node];
+      t->sum[node] = m_add(t->sum[node], t->middle[k / 8]), ++t->beside[node];
     }
     for (uint32_t k = 0; k < 8 * mesh->count; ++k) {
       const uint32_t node = mesh->corner[k / 8][k % 8];
       if (mesh->layer[k / 8] == layer)
-        t->stress[k / 8][k % 8] = m_scale(sum[node], 1.0 / count[node]);
+        t->stress[k / 8][k % 8] = m_scale(t->sum[node], 1.0 / t->beside[node]);
     }
   }
-  sonde_free(middle);
-  sonde_free(sum);
-  sonde_free(count);
-  return all ? SONDE_OK : sonde_fail_memory(error);
 }
 
 static sonde_status fill_bins(solid_tissue *t, sonde_error *error) {
@@ -274,14 +272,14 @@ sonde_status sonde_equilibrium_tissue(const sonde_equilibrium *e, sonde_interior
   *t = (solid_tissue){.tissue = {moved_at, stress_at}, .mesh = mesh};
   t->moved = SONDE_NEW(sonde_vec3, mesh->node_count);
   t->stress = (sonde_mat3(*)[8])sonde_calloc(mesh->count, sizeof *t->stress);
+  t->middle = SONDE_NEW(sonde_mat3, mesh->count);
+  t->sum = SONDE_NEW(sonde_mat3, mesh->node_count);
+  t->beside = SONDE_NEW(uint32_t, mesh->node_count);
   t->box = (sonde_vec3(*)[2])sonde_calloc(mesh->count, sizeof *t->box);
   t->first = SONDE_NEW(uint32_t, BINS * BINS * BINS + 1);
-  const bool all = t->moved && t->stress && t->box && t->first;
+  const bool all = t->moved && t->stress && t->middle && t->sum && t->beside && t->box && t->first;
   sonde_status status = all ? SONDE_OK : sonde_fail_memory(error);
-  if (!status) {
-    memcpy(t->moved, e->moved, mesh->node_count * sizeof *t->moved);
-    status = find_stress(t, e, error);
-  }
+  if (!status) sonde_solid_tissue_fill(&t->tissue, e, e->moved);
   if (!status) status = fill_bins(t, error);
   if (!status) status = find_border(t, error);
   if (status)
@@ -294,7 +292,8 @@ sonde_status sonde_equilibrium_tissue(const sonde_equilibrium *e, sonde_interior
 void sonde_solid_tissue_destroy(sonde_interior_tissue *tissue) {
   if (tissue == NULL) return;
   solid_tissue *t = (solid_tissue *)tissue;
-  void *parts[] = {t->moved, t->stress, t->box, t->first, t->listed, t->owner};
+  void *parts[] = {t->moved, t->stress, t->middle, t->sum,  t->beside,
+                   t->box,   t->first,  t->listed, t->owner};
   for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) sonde_free(parts[k]);
   sonde_surface_index_destroy(t->nearest);
   sonde_mesh_clear(&t->border);

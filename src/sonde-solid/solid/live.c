@@ -72,6 +72,8 @@ static sonde_status reserve(sonde_solid_live *l, sonde_error *error) {
       {(void **)&l->tangent, side * sonde_front_stride((uint32_t)side), sizeof *l->tangent},
       {(void **)&l->inverse, 2 * zone * sonde_front_stride((uint32_t)(2 * zone)),
        sizeof *l->inverse},
+      {(void **)&l->shown[0].moved, e->mesh->node_count, sizeof *l->skin},
+      {(void **)&l->shown[1].moved, e->mesh->node_count, sizeof *l->skin},
       {(void **)&l->shown[0].free_m, e->zone_count, sizeof *l->skin},
       {(void **)&l->shown[1].free_m, e->zone_count, sizeof *l->skin},
       {(void **)&l->shown[0].give_m_n, zone * l->width, sizeof(float)},
@@ -88,15 +90,21 @@ static sonde_status reserve(sonde_solid_live *l, sonde_error *error) {
   sonde_status status = SONDE_OK;
   for (int k = 0; k < 2 && !status; ++k)
     l->bulk[k].single = true, status = sonde_numeric_reserve(&l->bulk[k], e->symbolic, error);
+  l->e->numeric.kernels = l->bulk[0].kernels; // its only part that a live solid uses
   return status;
 }
 
-// The tangent of a state at rest, all at once. @return false: there is no positive one
-static bool begin_at_rest(sonde_solid_live *l, sonde_live_tangent *shown) {
+// The solid at rest with its tangent, all at once; the probe is at a pose that touches nothing.
+// @return false: there is no positive one
+static bool begin_at_rest(sonde_solid_live *l, sonde_pose pose, sonde_live_tangent *shown) {
+  sonde_equilibrium *e = l->e;
+  memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
+  e->pose = pose;
+  l->making = false, l->shift = 0, l->stuck = 0, l->rests = false;
   sonde_live_begin_factor(l);
   if (!sonde_live_share_factor(l, UINT64_MAX) || !sonde_live_forces(l)) return false;
   sonde_live_pull(l);
-  return sonde_live_show(l, shown);
+  return l->rests = shown->rests = sonde_live_show(l, shown);
 }
 
 sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe *probe,
@@ -123,13 +131,13 @@ sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe 
   status = sonde_equilibrium_place(mesh, probe, start, &def->solid, def->skin_m, &l->e, error);
   if (!status) status = reserve(l, error);
   if (!status) {
-    l->before = l->felt_pose = start;
+    l->before = l->asked_pose = l->felt_pose = start;
     arrange(l);
     // As many multiplications per pass as let the passes make a factor.
     l->slice = 1000000;
     while (sonde_symbolic_steps(l->e->symbolic, l->slice) > def->factor_passes)
       l->slice += l->slice / 16;
-    if (!begin_at_rest(l, &l->shown[0]))
+    if (!begin_at_rest(l, start, &l->shown[0]))
       status = sonde_fail(error, SONDE_CONVERGENCE, "the solid has no positive stiffness at rest");
     l->counts.factors = 0;
   }
@@ -155,6 +163,8 @@ void sonde_solid_live_destroy(sonde_solid_live *l) {
                    l->trial,
                    l->tangent,
                    l->inverse,
+                   l->shown[0].moved,
+                   l->shown[1].moved,
                    l->shown[0].free_m,
                    l->shown[1].free_m,
                    l->shown[0].give_m_n,
@@ -172,52 +182,115 @@ void sonde_solid_live_destroy(sonde_solid_live *l) {
 
 // ---- passes ---------------------------------------------------------------------------------
 
+// The tangent of the last pass serves on.
+static void keep_tangent(const sonde_solid_live *l, sonde_live_tangent *next,
+                         const sonde_live_tangent *last) {
+  memcpy(next->free_m, last->free_m, l->e->zone_count * sizeof *next->free_m);
+  memcpy(next->give_m_n, last->give_m_n,
+         3 * (size_t)l->e->zone_count * l->width * sizeof *next->give_m_n);
+  next->stiffness_n_m = last->stiffness_n_m;
+}
+
+// Where a pass goes: to where the probe will be in the middle of the time in which it serves, as
+// far as the state and the factor of the bulk bear it.
+static sonde_pose aim(sonde_solid_live *l, sonde_pose motion) {
+  const sonde_pose middle = l->bulk_pose[l->serves], from = l->e->pose;
+  sonde_pose pose = l->asked_pose;
+  for (double lead = l->def.lead_passes; lead > 0; lead -= 1)
+    pose = sonde_pose_blend(pose, pose_mul(motion, pose), fmin(lead, 1));
+  const double way = sonde_equilibrium_way(from, pose);
+  if (way > l->def.pass_m) pose = sonde_pose_blend(from, pose, l->def.pass_m / way);
+  const double lag = sonde_equilibrium_way(middle, pose);
+  if (lag > l->def.lag_m) pose = sonde_pose_blend(middle, pose, l->def.lag_m / lag);
+  l->counts.held += way > l->def.pass_m || lag > l->def.lag_m;
+  return pose;
+}
+
 bool sonde_solid_live_work(sonde_solid_live *l) {
   SONDE_ASSERT(l != NULL);
   const uint32_t asked = atomic_load_explicit(&l->asked, memory_order_acquire);
   if (asked == atomic_load_explicit(&l->done, memory_order_relaxed)) return false;
   sonde_equilibrium *e = l->e;
-  // A tangent serves ahead of its pass. The state goes no farther from itself, and from where the
-  // bulk was factored, than they bear.
-  const sonde_pose motion = pose_mul(l->asked_pose, pose_inverse(l->before));
-  sonde_pose pose = l->before = l->asked_pose;
-  for (double lead = l->def.lead_passes; lead > 0; lead -= 1)
-    pose = sonde_pose_blend(pose, pose_mul(motion, pose), fmin(lead, 1));
-  const double way = sonde_equilibrium_way(e->pose, pose);
-  if (way > l->def.pass_m) pose = sonde_pose_blend(e->pose, pose, l->def.pass_m / way);
-  const sonde_pose middle = l->bulk_pose[l->serves];
-  const double lag = sonde_equilibrium_way(middle, pose);
-  if (lag > l->def.lag_m) pose = sonde_pose_blend(middle, pose, l->def.lag_m / lag);
-  l->counts.held += way > l->def.pass_m || lag > l->def.lag_m;
-  bool found = sonde_live_follow(l, pose);
-  if (found) e->pose = pose;
-  // A factor begins when the probe has left the place of the latest one, when a shift has to make
-  // it positive definite, and when one was shifted.
-  if (!l->making && (l->shift > 0 || l->is_shifted[l->serves] ||
-                     sonde_equilibrium_way(l->bulk_pose[l->serves], e->pose) > l->def.refresh_m))
-    sonde_live_begin_factor(l);
-  (void)sonde_live_share_factor(l, l->slice);
-  sonde_live_pull(l);
   sonde_live_tangent *next = &l->shown[asked & 1], *last = &l->shown[!(asked & 1)];
-  if (!sonde_live_show(l, next)) {
-    found = false;
-    memcpy(next->free_m, last->free_m, e->zone_count * sizeof *next->free_m);
-    memcpy(next->give_m_n, last->give_m_n,
-           3 * (size_t)e->zone_count * l->width * sizeof *next->give_m_n);
-    next->stiffness_n_m = last->stiffness_n_m;
-  }
-  // A state that finds no way on goes back to rest, from where it follows the probe again.
-  l->counts.kept += !found;
-  l->stuck = found ? 0 : l->stuck + 1;
-  if (l->stuck > STUCK_MOST) {
+  const sonde_pose motion = pose_mul(l->asked_pose, pose_inverse(l->before));
+  l->before = l->asked_pose;
+  // A probe that touches nothing is followed by the solid at rest, wherever it goes.
+  const sonde_pose pose = aim(l, motion);
+  const bool clear = sonde_live_is_clear(l, pose);
+  bool found = true;
+  if (clear) {
     memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
-    e->pose = e->start;
-    l->making = false, l->shift = 0, l->stuck = 0;
-    begin_at_rest(l, next);
+    e->pose = l->asked_pose;
+    if (l->of_rest[l->serves]) l->bulk_pose[l->serves] = e->pose;
+    l->stuck = 0;
   }
+  if (clear && l->rests) {
+    if (!next->rests) keep_tangent(l, next, last);
+  } else {
+    l->rests = false;
+    if (clear) {
+      l->ready = false;
+      found = sonde_live_forces(l);
+    } else {
+      found = sonde_live_follow(l, pose);
+      if (found) e->pose = pose;
+    }
+    // A factor begins when the probe has left the place of the latest one, when a shift has to make
+    // it positive definite, when one was shifted, and once the solid is at rest.
+    const bool left =
+        clear ? !l->of_rest[l->serves]
+              : sonde_equilibrium_way(l->bulk_pose[l->serves], e->pose) > l->def.refresh_m;
+    if (!l->making && (l->shift > 0 || l->is_shifted[l->serves] || left))
+      sonde_live_begin_factor(l);
+    (void)sonde_live_share_factor(l, l->slice);
+    sonde_live_pull(l);
+    if (!sonde_live_show(l, next)) {
+      found = false;
+      keep_tangent(l, next, last);
+    }
+    // A state that finds no way on goes back to rest, from where it follows the probe again.
+    l->counts.kept += !found;
+    l->stuck = found ? 0 : l->stuck + 1;
+    l->rests = clear && found && l->of_rest[l->serves] && !l->is_shifted[l->serves] && !l->making &&
+               !(l->shift > 0);
+    if (l->stuck > STUCK_MOST) begin_at_rest(l, e->start, next);
+  }
+  next->rests = l->rests;
+  memcpy(next->moved, e->moved, e->mesh->node_count * sizeof *e->moved);
   ++l->counts.passes;
   atomic_store_explicit(&l->done, asked, memory_order_release);
   return true;
+}
+
+bool sonde_live_rest(sonde_solid_live *l, const sonde_pose asked[2]) {
+  SONDE_ASSERT(l != NULL && sonde_live_is_done(l));
+  if (!l->rests && !begin_at_rest(l, asked[0], &l->shown[l->serving])) return false;
+  sonde_live_tangent *shown = &l->shown[l->serving];
+  if (!shown->rests) keep_tangent(l, shown, &l->shown[!l->serving]);
+  memset(shown->moved, 0, l->e->mesh->node_count * sizeof *shown->moved);
+  shown->rests = true;
+  l->e->pose = l->bulk_pose[l->serves] = l->before = asked[0];
+  for (uint32_t n = 0; n < l->point_count; ++n) l->point[n].load_n = 0;
+  memcpy(l->skin, shown->free_m, l->e->zone_count * sizeof *l->skin);
+  l->felt_n = l->felt_nm = l->easing_n = l->easing_nm = vec3(0, 0, 0);
+  l->touches = l->adopts = false;
+  l->asked_before = asked[0], l->asked_pose = asked[1];
+  // The pass under way writes beside what serves.
+  const uint32_t next = atomic_load(&l->done) + ((atomic_load(&l->done) & 1) == l->serving ? 1 : 2);
+  atomic_store(&l->done, next - 1), atomic_store(&l->asked, next);
+  return true;
+}
+
+void sonde_live_walk(sonde_solid_live *l, sonde_pose pose) {
+  enum { PASSES_MOST = 60, SETTLING = 4 };
+  SONDE_ASSERT(l != NULL && sonde_live_is_done(l));
+  l->before = l->asked_before = l->asked_pose = pose;
+  for (int n = 0, there = 0; n < PASSES_MOST && there < SETTLING && !(n > 0 && l->rests); ++n) {
+    atomic_fetch_add(&l->asked, 1);
+    (void)sonde_solid_live_work(l);
+    there += !(sonde_equilibrium_way(l->e->pose, pose) > 0);
+  }
+  l->serving = atomic_load(&l->asked) & 1;
 }
 
 sonde_solid_live_counts sonde_solid_live_count(const sonde_solid_live *l) {

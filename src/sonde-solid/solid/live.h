@@ -13,6 +13,8 @@ typedef struct sonde_live_tangent {
   sonde_vec3 *free_m;   // [zone_count] places
   float *give_m_n;      // [side][width] displacements of the zone's nodes for a force on one
   double stiffness_n_m; // of all of the zone held to the probe
+  sonde_vec3 *moved;    // [node_count] displacements of the state
+  bool rests;           // the state is the solid's at rest, see sonde_live_is_at_rest()
 } sonde_live_tangent;
 
 // A point of the contact's quadrature.
@@ -43,7 +45,7 @@ struct sonde_solid_live {
   uint8_t *is_skin;      // [hexes]
   sonde_numeric bulk[2]; // the factor that serves and the one in the making
   sonde_pose bulk_pose[2];
-  bool is_shifted[2];
+  bool is_shifted[2], of_rest[2]; // made positive definite by a shift; of the solid at rest
   int serves;
   sonde_pose before; // that the pass before was asked for
   bool making;
@@ -58,18 +60,21 @@ struct sonde_solid_live {
   double *right, *rest, *trial; // [patch side]
   float *tangent;               // [patch side][stride] by columns: eliminated down to the zone
   bool ready;                   // `tangent` is that of the state
+  bool rests;                   // so do state, factor and `tangent`, as after the creation
   float *inverse;               // [2 zone side][stride] front
   sonde_solid_live_counts counts;
 
   // Both: a pass writes tangent[pass & 1].
-  _Atomic uint32_t asked, done; // passes
-  sonde_pose asked_pose;
+  _Atomic uint32_t asked, done;        // passes
+  sonde_pose asked_pose, asked_before; // of the pass asked for last and of the one before it
   sonde_live_tangent shown[2];
 
   // The tick's.
   uint32_t point_count, width, serving;
   uint64_t ticks;
   uint32_t late;
+  bool touches;                    // in the last tick
+  bool adopts;                     // what the hand felt on another solid is taken over
   sonde_live_point *point;         // [zone_faces * SONDE_TOUCH_POINTS]
   sonde_live_candidate *candidate; // [point_count]
   float *rows;                     // [point_count][width]
@@ -84,6 +89,24 @@ static inline size_t sonde_live_side(const sonde_solid_live *l) { // of patch an
   return 3 * (size_t)(l->e->patch_count + l->e->zone_count);
 }
 
+// Whether the pass that was asked for is done. @thread tick
+static inline bool sonde_live_is_done(const sonde_solid_live *l) {
+  return atomic_load_explicit(&l->done, memory_order_acquire) ==
+         atomic_load_explicit(&l->asked, memory_order_relaxed);
+}
+// A tick that takes over the pass that is done and asks for the next, or does not. @thread tick
+void sonde_live_step(sonde_solid_live *live, sonde_pose pose, bool take,
+                     sonde_solid_contact *contact);
+// Whether the solid is at rest, its factor and tangent too, and no skin bears the probe: then what
+// follows depends on asked_pose and asked_before alone. @thread tick
+static inline bool sonde_live_is_at_rest(const sonde_solid_live *l) {
+  return l->shown[l->serving].rests && !l->touches;
+}
+// Goes back there, with a pass under way at asked[1] behind one at asked[0]. Not during a pass.
+// @return false: there is no positive tangent @thread owner
+bool sonde_live_rest(sonde_solid_live *live, const sonde_pose asked[2]);
+// Takes the state to a pose by passes of its own, before any tick. @thread owner
+void sonde_live_walk(sonde_solid_live *live, sonde_pose pose);
 // Begins the factor of the state, all of it or in slices.
 void sonde_live_begin_factor(sonde_solid_live *live);
 // One share of it; a finished factor serves from then on. @return false: it is not done yet
@@ -94,7 +117,10 @@ bool sonde_live_forces(sonde_solid_live *live);
 void sonde_live_pull(sonde_solid_live *live);
 // The tangent at the state, condensed on the zone, for the tick. @return false: no positive one
 bool sonde_live_show(sonde_solid_live *live, sonde_live_tangent *shown);
-// Takes the state to a pose: the skin's Newton steps, then the bulk; leaves the forces there.
+// Whether a probe at the pose leaves the skin at rest.
+bool sonde_live_is_clear(sonde_solid_live *live, sonde_pose pose);
+// Takes the state to a pose that touches: the skin's Newton steps, then the bulk; leaves the forces
+// there.
 // @return false: no step found, the state is the old one
 bool sonde_live_follow(sonde_solid_live *live, sonde_pose pose);
 

@@ -114,6 +114,7 @@ static bool touch(sonde_solid_live *l, sonde_pose pose, sonde_solid_contact *con
     const sonde_vec3 push = v_scale(k->out, -(double)k->point->load_n);
     contact->force_n = v_add(contact->force_n, push);
     contact->torque_nm = v_add(contact->torque_nm, v_cross(k->arm, push));
+    contact->area_m2 += 1 / (k->point->soft_m_n * l->e->def.contact_n_m3);
     ++contact->points;
   }
   const sonde_vec3 *free_m = l->shown[l->serving].free_m;
@@ -146,25 +147,35 @@ static void ease(sonde_solid_live *l, sonde_pose pose, bool touches, sonde_solid
   l->felt_pose = pose;
 }
 
-void sonde_solid_live_tick(sonde_solid_live *l, sonde_pose pose, sonde_solid_contact *contact) {
+void sonde_live_step(sonde_solid_live *l, sonde_pose pose, bool take,
+                     sonde_solid_contact *contact) {
   SONDE_ASSERT(l != NULL && contact != NULL);
   sonde_solid_contact last;
-  bool renewed = false;
-  if (l->ticks++ % l->def.pass_ticks == 0) { // takes over the pass that is due, asks for the next
+  ++l->ticks;
+  if (take) {
     const uint32_t asked = atomic_load_explicit(&l->asked, memory_order_relaxed);
-    renewed = atomic_load_explicit(&l->done, memory_order_acquire) == asked;
-    if (renewed) {
-      (void)touch(l, pose, &last);
-      l->serving = asked & 1, l->asked_pose = pose;
-      atomic_store_explicit(&l->asked, asked + 1, memory_order_release);
-    } else {
-      ++l->late;
-    }
+    SONDE_ASSERT(sonde_live_is_done(l));
+    (void)touch(l, pose, &last);
+    l->serving = asked & 1, l->asked_before = l->asked_pose, l->asked_pose = pose;
+    atomic_store_explicit(&l->asked, asked + 1, memory_order_release);
   }
-  const bool touches = touch(l, pose, contact);
-  if (renewed) { // the hand goes on from what it would have felt on the last tangent
+  l->touches = touch(l, pose, contact);
+  // The hand goes on from what it would have felt on the last tangent, or felt on another solid.
+  if (take) {
     l->easing_n = v_add(l->easing_n, v_sub(last.force_n, contact->force_n));
     l->easing_nm = v_add(l->easing_nm, v_sub(last.torque_nm, contact->torque_nm));
   }
-  ease(l, pose, touches, contact);
+  if (l->adopts) {
+    l->easing_n = v_sub(l->felt_n, contact->force_n);
+    l->easing_nm = v_sub(l->felt_nm, contact->torque_nm);
+    l->adopts = false;
+  }
+  ease(l, pose, l->touches, contact);
+}
+
+void sonde_solid_live_tick(sonde_solid_live *l, sonde_pose pose, sonde_solid_contact *contact) {
+  SONDE_ASSERT(l != NULL && contact != NULL);
+  const bool due = l->ticks % l->def.pass_ticks == 0, take = due && sonde_live_is_done(l);
+  l->late += due && !take;
+  sonde_live_step(l, pose, take, contact);
 }

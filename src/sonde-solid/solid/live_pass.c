@@ -28,6 +28,9 @@ void sonde_live_begin_factor(sonde_solid_live *l) {
   memcpy(l->bulk_state, l->e->moved, l->e->mesh->node_count * sizeof *l->bulk_state);
   l->bulk_pose[!l->serves] = l->e->pose;
   l->is_shifted[!l->serves] = l->shift > 0;
+  l->of_rest[!l->serves] = true;
+  for (uint32_t n = 0; n < l->e->mesh->node_count; ++n)
+    if (v_norm2(l->bulk_state[n]) > 0) l->of_rest[!l->serves] = false;
   sonde_numeric_begin(&l->bulk[!l->serves], l->e->symbolic, &source);
   l->making = true;
 }
@@ -185,6 +188,13 @@ static bool search_line(sonde_solid_live *l, sonde_pose pose, patch_standing *s)
   return false;
 }
 
+// Such a probe leaves the skin there: no state has less energy.
+bool sonde_live_is_clear(sonde_solid_live *l, sonde_pose pose) {
+  sonde_equilibrium *e = l->e;
+  memset(e->trial, 0, e->mesh->node_count * sizeof *e->trial);
+  return sonde_equilibrium_touch(e, pose, e->trial, NULL, false, e->touch, NULL).energy_j == 0;
+}
+
 bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
   sonde_equilibrium *e = l->e;
   const size_t side = sonde_live_side(l), nodes = e->mesh->node_count;
@@ -192,13 +202,6 @@ bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
   const size_t first = 3 * (size_t)sonde_patch_first(e);
   patch_standing s;
   uint32_t steps = 0;
-  // A probe that does not touch the skin at rest leaves it there: no state has less energy.
-  memset(e->trial, 0, nodes * sizeof *e->trial);
-  if (sonde_equilibrium_touch(e, pose, e->trial, NULL, false, e->touch, NULL).energy_j == 0) {
-    memset(e->moved, 0, nodes * sizeof *e->moved);
-    l->ready = false;
-    return sonde_live_forces(l);
-  }
   memcpy(e->kept, e->moved, nodes * sizeof *e->moved);
   memset(l->ways, 0, side * sizeof *l->ways);
   memset(l->stretch, 0, side * sizeof *l->stretch);

@@ -42,22 +42,30 @@ static sonde_vec3 place_in_ring(const void *user, double level, uint32_t u, uint
 sonde_status sonde_hexes_ring(const sonde_model *model, const sonde_site *site,
                               const sonde_hexes_def *def, sonde_hexes *mesh, sonde_error *error) {
   SONDE_ASSERT(model != NULL && site != NULL && mesh != NULL);
+  sonde_interior *in = NULL;
+  if (model->femur.face_count == 0)
+    return sonde_fail(error, SONDE_ARGUMENT, "the model has no bone that could hold a ring");
+  if (model->edge_share != NULL)
+    return sonde_fail(error, SONDE_ARGUMENT, "the skin is cut: a ring has no lips");
+  sonde_status status = sonde_interior_create(model, &in, error);
+  if (!status) status = sonde_hexes_ring_of(in, site, def, mesh, error);
+  sonde_interior_destroy(in);
+  return status;
+}
+
+sonde_status sonde_hexes_ring_of(const sonde_interior *in, const sonde_site *site,
+                                 const sonde_hexes_def *def, sonde_hexes *mesh,
+                                 sonde_error *error) {
   sonde_status status = sonde_hexes_check(def, error);
   if (!status && (def->fat == 0 || def->skin == 0))
     status = sonde_fail(error, SONDE_ARGUMENT,
                         "a ring has fat and skin: expected at least one "
                         "hexahedron through each");
-  if (!status && model->femur.face_count == 0)
-    status = sonde_fail(error, SONDE_ARGUMENT, "the model has no bone that could hold a ring");
-  sonde_interior *in = NULL;
-  if (!status) status = sonde_interior_create(model, &in, error);
   if (status) return status;
   sonde_column_point at;
   ring r = {.in = in, .half_u = 0, .half_v = 0, .far_u = 1, .far_v = 1};
-  if (!sonde_interior_locate(in, site->position_m, &at)) {
-    sonde_interior_destroy(in);
+  if (!sonde_interior_locate(in, site->position_m, &at))
     return sonde_fail(error, SONDE_ARGUMENT, "site %u lies beyond the ends of the leg", site->id);
-  }
 
   // The skin's section: way along it from the site.
   double arc[ARC_PARTS + 1];
@@ -107,6 +115,5 @@ sonde_status sonde_hexes_ring(const sonde_model *model, const sonde_site *site,
     for (uint32_t n = 0; n < mesh->node_count && !status; ++n)
       if (n % r.v.count == 0 || n % r.v.count == r.v.count - 1) mesh->held[n] |= bit;
   }
-  sonde_interior_destroy(in);
   return status;
 }
