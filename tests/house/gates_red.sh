@@ -4,26 +4,28 @@
 set -euo pipefail
 house=$1 cc=$2 nm=$3 objdump=$4
 tree=$(mktemp -d)
-trap 'rm -rf "$tree"' EXIT
 wrong=0
 
-fresh() { # a tree that keeps every rule
+kept=$tree.kept # a tree that keeps every rule, made once
+trap 'rm -rf "$tree" "$kept"' EXIT
+mkdir -p "$kept"/src/sonde/{base,world} "$kept"/src/sonde-exam/stream "$kept"/include/sonde "$kept"/app "$kept"/tests/house "$kept"/docs
+printf '/** @thread any */\nSONDE_API int sonde_one(int a);\n' >"$kept/include/sonde/base.h"
+echo '#include "sonde/base.h"' >"$kept/include/sonde/world.h"
+printf '#include "base/base.h"\nint sonde_step(int a) {\n  SONDE_ASSERT(a);\n  return a;\n}\n' \
+  >"$kept/src/sonde/world/step_hot.c"
+echo '#include "sonde/base.h"' >"$kept/src/sonde/base/base.h"
+echo '#include "sonde/world.h"' >"$kept/app/main.c"
+: >"$kept/tests/house/hot_objects.txt"
+printf '%s\n' '# group room | does | read' 'sonde base | memory | docs/base.md' \
+  'sonde world | the step | docs/base.md' 'sonde-exam stream | the page | include/sonde/base.h' \
+  >"$kept/src/rooms.txt"
+: >"$kept/docs/base.md"
+printf '%s\n' '# Rooms' '<!-- rooms: -->' '<!-- end of rooms -->' >"$kept/docs/architecture.md"
+"$house/../../docs/rooms.sh" "$kept"
+
+fresh() { # that tree
   rm -rf "${tree:?}"/*
-  mkdir -p "$tree"/src/sonde/{base,world} "$tree"/src/sonde-exam/stream "$tree"/include/sonde "$tree"/app "$tree"/tests/house
-  printf '/** @thread any */\nSONDE_API int sonde_one(int a);\n' >"$tree/include/sonde/base.h"
-  echo '#include "sonde/base.h"' >"$tree/include/sonde/world.h"
-  printf '#include "base/base.h"\nint sonde_step(int a) {\n  SONDE_ASSERT(a);\n  return a;\n}\n' \
-    >"$tree/src/sonde/world/step_hot.c"
-  echo '#include "sonde/base.h"' >"$tree/src/sonde/base/base.h"
-  echo '#include "sonde/world.h"' >"$tree/app/main.c"
-  : >"$tree/tests/house/hot_objects.txt"
-  printf '%s\n' '# group room | does | read' 'sonde base | memory | docs/base.md' \
-    'sonde world | the step | docs/base.md' 'sonde-exam stream | the page | include/sonde/base.h' \
-    >"$tree/src/rooms.txt"
-  mkdir -p "$tree/docs"
-  : >"$tree/docs/base.md"
-  printf '%s\n' '# Rooms' '<!-- rooms: -->' '<!-- end of rooms -->' >"$tree/docs/architecture.md"
-  "$house/../../docs/rooms.sh" "$tree"
+  cp -r "$kept"/. "$tree"
 }
 compile() { # ROOM FILE TEXT: the object where the gate looks for it
   local object=$tree/build/src/sonde/$1/CMakeFiles/sonde_$1.dir/$2.o
