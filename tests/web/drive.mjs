@@ -6,9 +6,24 @@ export const PATIENCE_MS = 300000;
 
 export const browserPath = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].find(existsSync);
 
+/** Between two looks at a condition: Playwright's own look at every picture keeps the browser drawing pictures in which nothing has changed. */
+const LOOK_MS = 50;
+
 /** Speaks English, whatever the machine does, unless a context names another locale. */
-export const openBrowser = (chromium, more = [], program = null) =>
-  chromium.launch({ executablePath: program || browserPath, args: ["--lang=en-US", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more] });
+export async function openBrowser(chromium, more = [], program = null) {
+  const args = ["--lang=en-US", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
+  const browser = await chromium.launch({ executablePath: program || browserPath, args: [...args, ...more] });
+  const newContext = browser.newContext.bind(browser);
+  browser.newContext = async (options) => {
+    const context = await newContext(options);
+    context.on("page", (page) => {
+      const wait = page.waitForFunction.bind(page);
+      page.waitForFunction = (condition, arg, how = {}) => wait(condition, arg, { polling: LOOK_MS, ...how });
+    });
+    return context;
+  };
+  return browser;
+}
 
 /** The address that the program prints, in its parts; null when the text has none. */
 export function findAddress(text) {

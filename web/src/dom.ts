@@ -15,6 +15,11 @@ export function make<K extends keyof HTMLElementTagNameMap>(tag: K, className = 
   return element;
 }
 
+/** Writes a text where another one stands: one that is written again would be laid out again. */
+export function write(element: HTMLElement, text: string): void {
+  if (element.textContent !== text) element.textContent = text;
+}
+
 const SVG = "http://www.w3.org/2000/svg";
 
 export function draw(tag: string, attributes: Record<string, string | number> = {}, text = ""): SVGElement {

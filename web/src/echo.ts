@@ -2,7 +2,7 @@
 // and a kept image beside the live one.
 
 import { Calipers, type Tool } from "./calipers";
-import { label, make } from "./dom";
+import { label, make, write } from "./dom";
 import { DopplerBox, paintColour } from "./duplex";
 import { GateOverlay } from "./gate";
 import { PictureGuide } from "./guide";
@@ -216,7 +216,7 @@ export class EchoView {
   private titles(): void {
     const state = this.frozen ? t("echo.frozen") : this.compared ? t("echo.now") : "";
     const force = this.compared ? `, ${shown(this.force_n, 1)} N` : "";
-    this.live.title.textContent = state ? state + force : "";
+    write(this.live.title, state ? state + force : "");
   }
 
   private caption(controls: Controls): void {

@@ -1,7 +1,7 @@
 // The force on the probe as a bar: what is comfortable, what is not, the limit, and the corridor that
 // a guided compression asks for. True newtons; what a device renders, when that is less, is a notch.
 
-import { find, make } from "./dom";
+import { find, make, write } from "./dom";
 import { feedback, type Feedback } from "./feedback";
 import type { Compression, Snapshot } from "./protocol";
 import { ink, onTheme } from "./theme";
@@ -20,6 +20,7 @@ export class ForceBar {
   private force_n = 0;
   private rendered_n = 0;
   private drawn = "";
+  private told = ""; // in words and numbers
   private readonly c: CanvasRenderingContext2D;
   private readonly canvas = find<HTMLCanvasElement>("force-bar");
 
@@ -49,6 +50,7 @@ export class ForceBar {
   lost(on: boolean): void {
     if (!on) return;
     this.force_n = this.rendered_n = 0;
+    this.told = "";
     find("force-value").replaceChildren("–", make("small", "", "N"));
     find("force-word").textContent = t("force.not_connected");
     find("force-head").dataset.tone = "lost";
@@ -64,12 +66,16 @@ export class ForceBar {
     const touching = s.contact_area_mm2 > 0;
     const said = feedback({ force_n: this.force_n, touching, target_n: this.corridor, limit_n: this.limit_n, comfort_n: this.comfort_n, compression });
     const air = !touching && this.force_n < 0.05;
-    find("force-value").replaceChildren(air ? "–" : shown(this.force_n, 1), ...(air ? [] : [make("small", "", "N")]));
-    const word = said.word;
-    find("force-word").textContent = word;
-    find("force-head").dataset.tone = said.tone;
-    this.canvas.setAttribute("aria-valuenow", this.force_n.toFixed(1));
-    this.canvas.setAttribute("aria-valuetext", t("force.newtons", { force: shown(this.force_n, 1), word }));
+    const value = air ? "–" : shown(this.force_n, 1);
+    const key = `${value} ${said.word} ${said.tone}`;
+    if (key !== this.told) {
+      find("force-value").replaceChildren(value, ...(air ? [] : [make("small", "", "N")]));
+      write(find("force-word"), said.word);
+      find("force-head").dataset.tone = said.tone;
+      this.canvas.setAttribute("aria-valuenow", this.force_n.toFixed(1));
+      this.canvas.setAttribute("aria-valuetext", t("force.newtons", { force: shown(this.force_n, 1), word: said.word }));
+    }
+    this.told = key;
     this.paint();
     return said;
   }

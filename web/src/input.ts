@@ -200,7 +200,12 @@ export class Input {
     else action?.();
   }
 
-  /** Called once per animation frame. */
+  /** A key presses the probe as long as it is held. */
+  get holds(): boolean {
+    return this.space !== 0;
+  }
+
+  /** Called once per picture. */
   tick(now_s: number): void {
     const dt_s = Math.min(0.1, now_s - this.last_s);
     this.last_s = now_s;

@@ -4,7 +4,7 @@ import { Coach } from "./coach";
 import { gradient } from "./colour";
 import { Connection } from "./connection";
 import { Dial } from "./dial";
-import { announce, find, label, minutes, press, pressed, recall, release, remember } from "./dom";
+import { announce, find, label, minutes, press, pressed, recall, release, remember, write } from "./dom";
 import { Duplex } from "./duplex";
 import { EchoView } from "./echo";
 import { FilmBar } from "./film";
@@ -45,6 +45,7 @@ const COMFORT = 0.5; // of the limit, when the program does not say what is comf
 const LIFTED_MM = -8;
 const LIFTED_NOTE_MM = -1; // farther from the skin the image says why it is dark
 const EASED_MM = 0.5; // the probe rests on the skin
+const REST_MS = 250; // between two looks at what changes without a message or a hand, such as the rates
 
 const query = new URLSearchParams(location.search);
 
@@ -90,7 +91,7 @@ class App {
   private readonly input: Input;
   private pending: Frame | null = null;
   private goalDue = false;
-  private curveKey = "";
+  private curveKey: string | null = null; // null: the curve is to be drawn anew
   private placed = false; // the hold of this leg is chosen
   private fresh = false; // a hello came, its controls not yet
   private offered = query.has("site"); // who names a site knows what he wants
@@ -100,9 +101,9 @@ class App {
 
   constructor() {
     const connection = (this.connection = new Connection({
-      text: (message) => this.text(message),
+      text: (message) => (this.text(message), this.wake()),
       geometry: (part) => this.scene.setPart(part),
-      frame: (frame) => (this.pending = frame),
+      frame: (frame) => ((this.pending = frame), this.wake()),
       state: (connected, wait_s) => this.setConnected(connected, wait_s),
       refused: () => this.refused(),
     }));
@@ -163,11 +164,21 @@ class App {
     this.input = this.wireInput();
     this.wireButtons();
     startTheme();
-    const loop = (now: number): void => {
-      requestAnimationFrame(loop); // first: whatever goes wrong in one picture, the next one comes
+    this.scene.changed = () => this.wake();
+    for (const event of ["pointerdown", "pointermove", "pointerup", "wheel", "keydown", "keyup", "input", "click", "change"]) window.addEventListener(event, () => this.wake(), { capture: true, passive: true });
+    window.setInterval(() => this.wake(), REST_MS);
+    this.wake();
+  }
+
+  private awake = false;
+  /** Asks for a picture. While nothing comes, moves or is touched none is drawn, so that the processor is left to the simulation beside it. */
+  private wake(): void {
+    if (this.awake) return;
+    this.awake = true;
+    requestAnimationFrame((now) => {
+      this.awake = false; // first: whatever goes wrong in one picture, the next one comes
       this.animate(now / 1000);
-    };
-    requestAnimationFrame(loop);
+    });
   }
 
   private wireInput(): Input {
@@ -277,7 +288,7 @@ class App {
     this.editor.set(controls);
     this.scene.setGel((controls.gel_ml ?? 0) > 0.05);
     if (probeChanged) this.plot.clear();
-    this.curveKey = "";
+    this.curveKey = null;
     if (this.fresh) this.furnish();
     if (!this.placed) this.place(controls);
     this.updateCurve();
@@ -530,9 +541,10 @@ class App {
 
   private moved(): void {
     this.goalDue = true;
+    this.wake();
     if (this.snapshot) this.route.to(this.scene.skin, this.snapshot.position_mm, this.hold.point);
     if (this.snapshot && this.snapshot.tick > 0 && this.hold.depth_mm > 0) find("hint").classList.add("gone");
-    find("depth-value").textContent = `${decimal(this.hold.depth_mm.toFixed(1).replace(/\.0$/, ""))} mm`;
+    write(find("depth-value"), `${decimal(this.hold.depth_mm.toFixed(1).replace(/\.0$/, ""))} mm`);
     find<HTMLInputElement>("depth-slider").value = String(this.hold.depth_mm);
     this.updateCurve();
   }
@@ -595,10 +607,10 @@ class App {
     const points = useful ? (near.site.curves[probe] ?? []) : [];
     const where = near ? near.distance_mm >= 0.5 ? t("main.place_away", { n: near.site.id, mm: near.distance_mm.toFixed(0) }) : t("main.place", { n: near.site.id }) : "";
     const none = useful ? t("main.not_computed", { probe: amid(label(probe)) }) : t("main.no_curve");
-    find("plot-site").textContent = points.length ? t("main.probe_at", { probe: label(probe), where }) : none;
+    write(find("plot-site"), points.length ? t("main.probe_at", { probe: label(probe), where }) : none);
     find("key-measured").hidden = points.length === 0;
     const key = points.length ? `${near!.site.id} ${probe}` : "";
-    if (key !== this.curveKey || key === "") {
+    if (key !== this.curveKey) {
       this.curveKey = key;
       this.plot.measured({ penetration_mm: points.map((p) => p[0]), force_n: points.map((p) => p[1]) });
     }
@@ -624,7 +636,8 @@ class App {
     if (frame) this.show(frame);
     if (frame) this.connection.ack(frame.sequence); // before the leg: image and force do not wait for it
     if (this.imaged) this.scene.render(now_s); // its first picture takes long: the image goes before it
-    this.imaged ||= this.frames > 0;
+    if (!this.imaged && this.frames > 0) (this.imaged = true), this.wake(); // for the leg
+    if (this.input.holds) this.wake();
     this.nameTarget();
     this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms);
   }

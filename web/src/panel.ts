@@ -101,6 +101,7 @@ export class Sliders {
 interface Gauge {
   row: HTMLElement;
   value: HTMLElement;
+  said: string;
 }
 
 /** A line of numbers: how far the probe is pressed in, vein, artery; dashes while it is in the air. */
@@ -123,7 +124,7 @@ export class Readouts {
     const value = make("b");
     row.append(make("span", "caption", name), value);
     this.box.append(row);
-    return { row, value };
+    return { row, value, said: "" };
   }
 
   /** In an exam without full guidance the learner judges the vein by eye. */
@@ -138,15 +139,17 @@ export class Readouts {
     if (!on) return;
     for (const g of [this.pressed, this.vein, this.diameter, this.artery]) {
       g.row.classList.add("away");
-      g.value.replaceChildren("–");
+      g.value.replaceChildren((g.said = "–"));
     }
   }
 
   private static number(gauge: Gauge, value: number, digits: number, unit: string, touching: boolean): void {
     const away = !touching || !Number.isFinite(value);
+    const word = away ? (touching ? t("readout.not_in_view") : "–") : shown(value, digits);
+    if (gauge.said === word) return; // what is written anew is laid out anew
+    gauge.said = word;
     gauge.row.classList.toggle("away", away);
-    const word = touching ? t("readout.not_in_view") : "–";
-    gauge.value.replaceChildren(away ? word : shown(value, digits), ...(away ? [] : [make("small", "", unit)]));
+    gauge.value.replaceChildren(word, ...(away ? [] : [make("small", "", unit)]));
   }
 
   show(s: Snapshot): void {

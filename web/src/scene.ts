@@ -3,7 +3,7 @@
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import { creased } from "./creased";
 import { find } from "./dom";
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
 import { FlatView, movedShare, type FlatVessel } from "./flat";
@@ -70,11 +70,11 @@ function splitEnds(mesh: Mesh): { skin: number[]; ends: number[] } {
   }
   const skin: number[] = [];
   const ends: number[] = [];
+  const along = (corner: number): number => mesh.points[3 * mesh.faces[corner]! + 2]!;
   for (let f = 0; f < mesh.faces.length; f += 3) {
-    const face = [mesh.faces[f]!, mesh.faces[f + 1]!, mesh.faces[f + 2]!];
-    const z = face.map((v) => mesh.points[3 * v + 2]!);
-    const flat = z.every((h) => h < low + 0.5) || z.every((h) => h > high - 0.5);
-    (flat ? ends : skin).push(...face);
+    const [a, b, c] = [along(f), along(f + 1), along(f + 2)];
+    const flat = Math.max(a, b, c) < low + 0.5 || Math.min(a, b, c) > high - 0.5;
+    (flat ? ends : skin).push(mesh.faces[f]!, mesh.faces[f + 1]!, mesh.faces[f + 2]!);
   }
   return { skin, ends };
 }
@@ -108,6 +108,8 @@ interface SiteDot {
 export class LegScene {
   skin: Skin | null = null;
   rangeChanged: (range_mm: number) => void = () => undefined;
+  /** the picture is no longer what there is to see */
+  changed: () => void = () => undefined;
   readonly orbit: OrbitControls;
   private renderer: THREE.WebGLRenderer | null = null;
   private readonly scene = new THREE.Scene();
@@ -195,11 +197,16 @@ export class LegScene {
     this.lights.add(key, rim);
   }
 
+  private spoil(): void {
+    this.dirty = true;
+    this.changed();
+  }
+
   /** In the colours of the present theme. */
   private repaint(): void {
     this.scene.traverse((thing) => repaint((thing as THREE.Mesh).material));
     if (this.skin) this.sides.place(this.skin.points);
-    this.dirty = true;
+    this.spoil();
   }
 
   private configureOrbit(): void {
@@ -209,7 +216,7 @@ export class LegScene {
     this.orbit.touches = { ONE: null, TWO: null }; // one finger beside the leg turns (input.ts)
     this.orbit.minDistance = 220;
     this.orbit.maxDistance = FARTHEST_MM;
-    this.orbit.addEventListener("change", () => (this.dirty = true));
+    this.orbit.addEventListener("change", () => (this.spoil()));
   }
 
   /** The middle and the length of what is to be seen; a patient of another length is looked at anew. */
@@ -250,7 +257,7 @@ export class LegScene {
     if (Math.abs(up.z) > 0.5) away.set(0.5 * medial, 0.8, -0.25).normalize();
     this.camera.position.copy(this.orbit.target).addScaledVector(away, this.away_mm);
     this.orbit.update();
-    this.dirty = true;
+    this.spoil();
   }
 
   zoom(factor: number): void {
@@ -258,7 +265,7 @@ export class LegScene {
     offset.setLength(Math.min(FARTHEST_MM, Math.max(220, offset.length() * factor)));
     this.camera.position.copy(this.orbit.target).add(offset);
     this.orbit.update();
-    this.dirty = true;
+    this.spoil();
   }
 
   private resize(): void {
@@ -269,7 +276,7 @@ export class LegScene {
     const narrow = Math.max(1, WIDE / this.camera.aspect); // the leg lies across: a narrow picture looks wider
     this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(narrow * Math.tan(THREE.MathUtils.degToRad(FOV_DEG / 2))));
     this.camera.updateProjectionMatrix();
-    this.dirty = true;
+    this.spoil();
   }
 
   seeThrough(on: boolean): void {
@@ -282,7 +289,7 @@ export class LegScene {
     this.inside.visible = on;
     this.foot.seeThrough(on);
     this.plane.visible = on && this.texture !== null;
-    this.dirty = true;
+    this.spoil();
   }
 
   get isThrough(): boolean {
@@ -297,7 +304,7 @@ export class LegScene {
     else if (part.part === PART.femur) this.setFemur(part);
     else this.setProbeBody(part);
     this.moved = true; // the new part has to be put where the newest frame has it
-    this.dirty = true;
+    this.spoil();
   }
 
   private static geometry(mesh: Mesh): THREE.BufferGeometry {
@@ -343,7 +350,7 @@ export class LegScene {
 
   private setFemur(mesh: Mesh): void {
     const material = new THREE.MeshStandardMaterial({ color: SOLID.bone, roughness: 0.9 });
-    this.replaceInside("femur", new THREE.Mesh(toCreasedNormals(LegScene.geometry(mesh), CREASE_RAD), material));
+    this.replaceInside("femur", new THREE.Mesh(creased(mesh.points, mesh.faces, CREASE_RAD), material));
   }
 
   private setVessel(line: Line): void {
@@ -368,7 +375,7 @@ export class LegScene {
   private setProbeBody(mesh: Mesh): void {
     const points = mesh.points.slice();
     for (let i = 2; i < points.length; i += 3) points[i] = Math.max(points[i]!, -BEHIND_MM);
-    const g = toCreasedNormals(LegScene.geometry({ ...mesh, points }), CREASE_RAD);
+    const g = creased(points, mesh.faces, CREASE_RAD);
     const round = mesh.faces.length > 3 * 60;
     const material = paint(new THREE.MeshStandardMaterial({ roughness: 0.5, transparent: true, opacity: 0.5 }), "probe");
     const body = new THREE.Mesh(g, material);
@@ -391,7 +398,7 @@ export class LegScene {
       mark.position.set(-info.half_x_mm, 0, -Math.min(10, 4 * info.half_y_mm));
       this.probeBodies.get(i)?.add(mark);
     });
-    this.dirty = true;
+    this.spoil();
   }
 
   setSites(sites: readonly Site[]): void {
@@ -406,19 +413,19 @@ export class LegScene {
     this.dotInfo = sites.map((site) => ({ node: this.nearestNode(site.position_mm), rest: new THREE.Vector3(...site.position_mm) }));
     this.scene.add(this.dots);
     this.moveDots(this.placed);
-    this.dirty = true;
+    this.spoil();
   }
 
   /** The measured sites mean something in free practice only. */
   showSites(on: boolean): void {
     if (!this.dots || this.dots.visible === on) return;
     this.dots.visible = on;
-    this.dirty = true;
+    this.spoil();
   }
 
   setTarget(target: Target | null, reached: boolean): void {
     if (!this.target.set(target, reached)) return;
-    this.dirty = true;
+    this.spoil();
     const place = target ? target.position_mm.join() : "";
     if (target && place !== this.faced) this.face(target);
     this.faced = place;
@@ -450,7 +457,7 @@ export class LegScene {
   private wetSkin(): void {
     const wet = this.surface?.geometry.getAttribute("wet");
     if (wet) wet.needsUpdate = true;
-    this.dirty = true;
+    this.spoil();
   }
 
   private nearestNode(p: Vec3): number {
@@ -602,7 +609,7 @@ export class LegScene {
       mesh.renderOrder = 5;
       this.marked.add(mesh);
     }
-    this.dirty = true;
+    this.spoil();
   }
 
   private markedLines(): FlatVessel[] {
@@ -643,7 +650,7 @@ export class LegScene {
       this.ring.position.set(...p);
       this.ring.lookAt(p[0] + normal[0], p[1] + normal[1], p[2] + normal[2]);
     }
-    this.dirty = true;
+    this.spoil();
   }
 
   /** Takes up to half a second, so only the first picture asks for it: the echo image goes before. Null: this
@@ -671,7 +678,7 @@ export class LegScene {
     if (on) this.flat ??= new FlatView(canvas);
     canvas.hidden = !on;
     this.canvas.classList.toggle("unlit", on);
-    this.dirty = true;
+    this.spoil();
     this.flatChanged(on);
   }
 
@@ -690,7 +697,7 @@ export class LegScene {
       target: this.target.shown,
       through: this.through,
     });
-    if (!drawn) this.dirty = true;
+    if (!drawn) this.spoil();
   }
 
   /** Draws the leg if it has changed; with low quality at most 8 times a second, and once a second while nothing
