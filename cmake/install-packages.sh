@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# install-packages.sh GROUP...: sees to it that the Debian packages of the groups "build", "test" and
-# "package" are there. Installs what is missing as root or through sudo; otherwise prints the one command
+# install-packages.sh GROUP...: sees to it that the Debian packages of the groups "build", "build-tests" (what the
+# tests are configured and built with), "test" (what they run besides) and "package" are there. Installs what is missing as root or through sudo; otherwise prints the one command
 # that would and exits with 2. Asks nothing and touches nothing when everything is there.
 set -euo pipefail
 
@@ -36,20 +36,23 @@ build_packages() {
   if ! has npm; then missing+=(npm ca-certificates); fi
 }
 
-test_packages() {
+build_tests_packages() {
   need_library libcjson libcjson-dev # a second reader of JSON
   need_library cmocka libcmocka-dev
   need_library ccd libccd-dev
   need_library hdf5 libhdf5-dev # data sets as HDF5, and a reader of them
-  installed python3-h5py || missing+=(python3-h5py)
   need_command ld.lld lld # links hundreds of tests in a third of the time
-  need_command clang clang
   if [[ $(uname -m) == x86_64 ]]; then # another C library and another processor give the same bits
     need_command musl-gcc musl-tools
     need_command aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
     installed libc6-dev-arm64-cross || missing+=(libc6-dev-arm64-cross)
     need_command qemu-aarch64 qemu-user
   fi
+}
+
+test_packages() {
+  installed python3-h5py || missing+=(python3-h5py)
+  need_command clang clang
   need_command clang-format-14 clang-format-14
   need_command clang-tidy-14 clang-tidy-14
   need_command doxygen doxygen
@@ -138,9 +141,10 @@ install_missing() {
 for group in "$@"; do
   case $group in
   build) build_packages ;;
+  build-tests) build_tests_packages ;;
   test) test_packages ;;
   package) package_packages ;;
-  *) echo "install-packages.sh: unknown group '$group', expected build, test or package" >&2; exit 2 ;;
+  *) echo "install-packages.sh: unknown group '$group', expected build, build-tests, test or package" >&2; exit 2 ;;
   esac
 done
 if ((${#missing[@]})); then
