@@ -22,4 +22,10 @@
 #define ROUNDS(all, sanitized) (all)
 #endif
 
+// Begins a test whose code others of its program reach: sanitizers leave it out.
+#define NOT_SANITIZED()                                                                            \
+  do {                                                                                             \
+    if (ROUNDS(false, true)) skip();                                                               \
+  } while (0)
+
 #endif

@@ -1,6 +1,7 @@
 // The texture of fat and muscle: lines along the skin and the fibres, dots across them, carried by
 // the tissue, and no repetition of the tiles in view.
 #include "echo/bench.h"
+#include "sanitized.h"
 #include "base/random.h"
 #include "echo/echo.h"
 #include "echo/gates.h"
@@ -35,6 +36,7 @@ static double alike(const bench *b, uint32_t row, uint32_t rows, uint32_t lines,
 }
 
 static void muscle_has_stripes_along_and_dots_across(void **state) {
+  NOT_SANITIZED();
   (void)state;
   bench b;
   bench_create(&b, leg_radius, 0.014, 0.006, false, false);
@@ -52,6 +54,7 @@ static void muscle_has_stripes_along_and_dots_across(void **state) {
 }
 
 static void tiles_do_not_repeat_in_view(void **state) {
+  NOT_SANITIZED();
   (void)state;
   bench b;
   bench_create(&b, 0.1, 0.014, 0.045, false, false);

@@ -98,6 +98,7 @@ static void frame_is_of_one_state(void **state) {
 
 // Depth of the scripted face below the rest skin: the script says it, the frame measures it.
 static void penetration_follows_the_script(void **state) {
+  NOT_SANITIZED();
   sonde_session_def def = small_def(*state);
   sonde_site site = barrel_site();
   const double depths_m[] = {-0.03, -0.004, 0.0, 0.008, 0.02};
@@ -135,6 +136,7 @@ static void equal_inputs_give_equal_states(void **state) {
 
 // Two sessions tick by tick in turn are the same two sessions one after the other.
 static void sessions_do_not_know_of_each_other(void **state) {
+  NOT_SANITIZED();
   sonde_session_def def = small_def(*state), other = def;
   other.controls.probe = 0;
   uint64_t hash_a = hash_after(&def, 200), hash_b = hash_after(&other, 200);
@@ -274,6 +276,7 @@ static void faults_fade_and_resume(void **state) {
 
 // A device may send a rotation of another length: the world sees the rotation it stands for.
 static void rotations_are_made_unit(void **state) {
+  NOT_SANITIZED();
   sonde_session_def def = small_def(*state);
   moody m[2];
   sonde_session *session[2];
@@ -320,6 +323,7 @@ static void limits_hold_against_a_jump(void **state) {
 
 // Through a coupling: at rest the device feels scale x tissue, and the metrics the tissue itself.
 static void device_force_is_the_scaled_tissue(void **state) {
+  NOT_SANITIZED();
   sonde_session_def def = small_def(*state);
   const sonde_device_limits *omega = sonde_device_limits_find("omega.3");
   def.rendering = sonde_render_def_for(omega, def.world.dt_s, 0.0);

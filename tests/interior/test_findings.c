@@ -1,6 +1,7 @@
 // What a case adds: branches that close by themselves, clots in them, lesions that lie in the
 // tissue, refusals.
 #include "interior/vessels.h"
+#include "sanitized.h"
 #include "interior/tube.h"
 
 #include <stdio.h>
@@ -100,6 +101,7 @@ static void branches_are_vessels(void **state) {
 }
 
 static void superficial_vein_closes_first(void **state) {
+  NOT_SANITIZED();
   (void)state;
   limb l;
   create(&l);
@@ -150,6 +152,7 @@ static void clot_in_one_vein_leaves_the_other(void **state) {
 
 // Points of every wall come to lie on its ellipse, whatever the vessels beside it do.
 static void each_wall_is_exact(void **state) {
+  NOT_SANITIZED();
   (void)state;
   limb l;
   create(&l);
@@ -307,6 +310,7 @@ static void memory_holds_every_vessel(void **state) {
 // In equilibrium the vessels are those of the place, wherever the probe was before and whatever
 // window was being built.
 static void equilibrium_forgets_where_the_probe_was(void **state) {
+  NOT_SANITIZED();
   (void)state;
   static limb fresh, used;
   create(&fresh), create(&used);
@@ -327,6 +331,7 @@ static void equilibrium_forgets_where_the_probe_was(void **state) {
 
 // A probe at 60 mm/s outruns the windows of a session; one whose updates wait stays with the solid.
 static void who_waits_keeps_the_solid(void **state) {
+  NOT_SANITIZED();
   (void)state;
   static limb l;
   create(&l);

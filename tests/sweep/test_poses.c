@@ -1,6 +1,7 @@
 // Poses corrected by what frames show: sweeps through a known phantom whose tracker is late, whose
 // calibration is off or whose poses jitter.
 #include "fixture.h"
+#include "sanitized.h"
 #include "sonde/sweep_poses.h"
 #include "sweep/poses.h"
 
@@ -111,6 +112,7 @@ static sonde_pose_findings refine(sonde_sequence *s) {
 }
 
 static void a_clean_sweep_stays(void **state) {
+  NOT_SANITIZED();
   (void)state;
   const errors none = {0};
   sonde_sequence s = sweep(hand, &none);
@@ -136,6 +138,7 @@ static void an_offset_is_found(void **state) {
 }
 
 static void jitter_is_smoothed(void **state) {
+  NOT_SANITIZED();
   (void)state;
   const errors rough = {.jitter_m = 2e-4, .jitter_rad = 2e-3};
   sonde_sequence s = sweep(hand, &rough);
@@ -150,6 +153,7 @@ static void jitter_is_smoothed(void **state) {
 }
 
 static void a_calibration_is_found(void **state) {
+  NOT_SANITIZED();
   (void)state;
   const errors bent = {.calibration = {0.8e-3, -1.1e-3, 0.6e-3, 0.02, -0.025, 0.015},
                        .jitter_m = 2e-5,
@@ -165,6 +169,7 @@ static void a_calibration_is_found(void **state) {
 
 // On rails of even speed every offset and every shift of the calibration shows the same pictures.
 static void what_does_not_show_is_kept(void **state) {
+  NOT_SANITIZED();
   (void)state;
   const errors rough = {.offset_s = 0.05, .jitter_m = 1e-4, .jitter_rad = 1e-3};
   sonde_sequence s = sweep(rail, &rough);
@@ -175,6 +180,7 @@ static void what_does_not_show_is_kept(void **state) {
 }
 
 static void hidden_content_leaves_no_trace(void **state) {
+  NOT_SANITIZED();
   (void)state;
   const errors rough = {.offset_s = 0.06, .jitter_m = 1e-4, .jitter_rad = 1e-3};
   sonde_sequence a = sweep(hand, &rough), b = sweep(hand, &rough);
