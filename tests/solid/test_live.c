@@ -81,6 +81,11 @@ static void a_held_pose_ends_at_the_equilibrium(void **state) {
     for (int t = 0; t < 200; ++t) force = step(&r, depth, aside);
     check(sonde_equilibrium_find(exact, deep(&r, depth, aside), &result, &error), &error);
     assert_near(v_distance(force, result.force_n) / v_norm(result.force_n), 0, 5e-4);
+    // From there on passes have nothing to do.
+    const uint32_t steps = sonde_solid_live_count(r.live).skin_steps;
+    for (int t = 0; t < 100; ++t) force = step(&r, depth, aside);
+    assert_int_equal(sonde_solid_live_count(r.live).skin_steps, steps);
+    assert_near(v_distance(force, result.force_n) / v_norm(result.force_n), 0, 5e-4);
   }
   assert_true(sonde_solid_live_count(r.live).factors >= 2);
   sonde_equilibrium_destroy(exact);

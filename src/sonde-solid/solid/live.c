@@ -6,7 +6,8 @@
 
 #include <string.h>
 
-enum { STUCK_MOST = 2 }; // passes without a step before a state goes back to rest
+enum { STUCK_MOST = 2 };    // passes without a step before a state goes back to rest
+enum { SETTLED_LEAST = 3 }; // passes in balance before a held probe needs none
 
 sonde_solid_live_def sonde_solid_live_def_default(void) {
   return (sonde_solid_live_def){.version = SONDE_DEF_VERSION,
@@ -100,7 +101,7 @@ static bool begin_at_rest(sonde_solid_live *l, sonde_pose pose, sonde_live_tange
   sonde_equilibrium *e = l->e;
   memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
   e->pose = pose;
-  l->making = false, l->shift = 0, l->stuck = 0, l->rests = false;
+  l->making = false, l->shift = 0, l->stuck = l->settled = 0, l->rests = false;
   sonde_live_begin_factor(l);
   if (!sonde_live_share_factor(l, UINT64_MAX) || !sonde_live_forces(l)) return false;
   sonde_live_pull(l);
@@ -222,10 +223,13 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
     memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
     e->pose = l->asked_pose;
     if (l->of_rest[l->serves]) l->bulk_pose[l->serves] = e->pose;
-    l->stuck = 0;
+    l->stuck = l->settled = 0;
   }
-  if (clear && l->rests) {
-    if (!next->rests) keep_tangent(l, next, last);
+  // One that is held needs no pass once some have had nothing to do.
+  const bool held = !clear && l->settled >= SETTLED_LEAST && !l->making && !(l->shift > 0) &&
+                    sonde_equilibrium_way(e->pose, pose) < sonde_live_still_m;
+  if (held || (clear && l->rests)) {
+    if (!next->rests || held) keep_tangent(l, next, last);
   } else {
     l->rests = false;
     if (clear) {

@@ -17,6 +17,9 @@ typedef struct sonde_live_tangent {
   bool rests;           // the state is the solid's at rest, see sonde_live_is_at_rest()
 } sonde_live_tangent;
 
+// A probe whose way from the state's pose is less than this is where the state is.
+static const double sonde_live_still_m = 1e-7;
+
 // A point of the contact's quadrature.
 typedef struct sonde_live_point {
   uint32_t node[4]; // of the zone
@@ -50,6 +53,7 @@ struct sonde_solid_live {
   sonde_pose before; // that the pass before was asked for
   bool making;
   uint32_t stuck;               // passes in a row that found no step
+  uint32_t settled;             // passes in a row at one pose that began in balance
   double shift;                 // of the factor in the making, over an element's mean diagonal
   uint64_t slice;               // multiplications of a factor per pass
   sonde_vec3 *bulk_state;       // [node_count] that the factor in the making is of

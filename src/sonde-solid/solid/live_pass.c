@@ -206,6 +206,8 @@ bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
   memset(l->ways, 0, side * sizeof *l->ways);
   memset(l->stretch, 0, side * sizeof *l->stretch);
   if (!stand(l, pose, e->moved, l->ways, l->stretch, l->right, &s)) return false;
+  const bool stays = sonde_equilibrium_way(e->pose, pose) < sonde_live_still_m;
+  l->settled = stays && s.residual <= tolerance * s.load ? l->settled + 1 : 0;
   while (steps < l->def.skin_steps) {
     if (!l->ready && !condense(l, e->moved, l->right)) break;
     l->ready = false;
