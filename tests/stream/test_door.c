@@ -32,6 +32,16 @@ static int note_join(void *user, const char *name, bool watches, char answer[SON
   return 200;
 }
 
+static const char *const LEARNERS[] = {"0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a",
+                                       "0b0b0b0b0b0b0b0b0b0b0b0b0b0b0b0b"};
+
+static int follow(void *user, uint32_t place, int64_t since_unix_s, char **answer) {
+  (void)user;
+  *answer = SONDE_NEW(char, 64);
+  snprintf(*answer, 64, "{\"place\":%u,\"since\":%lld}", place, (long long)since_unix_s);
+  return 200;
+}
+
 static int open_door(void **state) {
   if (start_server(state)) return -1;
   fixture *f = *state;
@@ -43,7 +53,9 @@ static int open_door(void **state) {
                         .teacher_token = TEACHER,
                         .first_port = f->port,
                         .places = 2,
-                        .join = note_join};
+                        .join = note_join,
+                        .learner_tokens = LEARNERS,
+                        .follow = follow};
   return (int)sonde_door_open(&def, &at.door, NULL);
 }
 
@@ -288,12 +300,38 @@ static void an_identity_is_a_key_and_its_certificate(void **state) {
   assert_string_not_equal(code[0], code[1]);
 }
 
+// A ticket leads to the place of the learner who linked it, from any site, and keeps its time.
+static void a_ticket_leads_to_its_place(void **state) {
+  (void)state;
+  static const char SECOND[] = "Authorization: Bearer 0b0b0b0b0b0b0b0b0b0b0b0b0b0b0b0b\r\n";
+  static const char LINK[] = "/lms?ticket=00112233445566778899aabbccddeeff";
+  static const char READ[] = "/lms.json?ticket=00112233445566778899aabbccddeeff";
+  char text[4096], again[4096];
+  uint64_t wrong = sonde_door_wrong(at.door);
+  assert_int_equal(ask(READ, SECOND, text), 404);
+  assert_int_equal(ask(LINK, "", text), 401);
+  assert_int_equal(ask(LINK, "Authorization: Bearer ffeeddccbbaa99887766554433221100\r\n", text),
+                   401); // the teacher's
+  assert_null(strstr(text, "Access-Control"));
+  assert_int_equal(sonde_door_wrong(at.door), wrong + 3);
+  assert_int_equal(ask(LINK, SECOND, text), 200);
+  assert_int_equal(ask(READ, "", again), 200);
+  assert_non_null(strstr(again, "{\"place\":2,\"since\":1"));
+  assert_non_null(strstr(again, "Access-Control-Allow-Origin: *"));
+  sleep(2); // whole seconds are told
+  assert_int_equal(ask(LINK, SECOND, text), 200);
+  assert_int_equal(ask(READ, "", text), 200);
+  assert_string_equal(strstr(text, "{\"place"), strstr(again, "{\"place"));
+  assert_int_equal(ask("/lms?ticket=0011223344556677889", SECOND, text), 404);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       SERVER_TEST(a_page_goes_through_the_door),
       SERVER_TEST(the_door_asks_who_comes),
       SERVER_TEST(a_code_opens_a_place),
       SERVER_TEST(strangers_cost_the_others_nothing),
+      SERVER_TEST(a_ticket_leads_to_its_place),
       SERVER_TEST(an_identity_is_a_key_and_its_certificate),
   };
   return cmocka_run_group_tests(tests, open_door, close_door);

@@ -78,6 +78,7 @@ void sonde_door_close(sonde_door *door) {
   if (door->listener >= 0) close(door->listener);
   if (door->wake >= 0) close(door->wake);
   SSL_CTX_free(door->context);
+  sonde_free(door->ticket);
   for (int i = 0; i < SONDE_DOOR_TEXTS; ++i) sonde_free(door->text[i]);
   pthread_mutex_destroy(&door->lock);
   sonde_free(door);
