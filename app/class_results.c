@@ -14,6 +14,14 @@ static void publish(sonde_door *door, sonde_door_text which, sonde_file *file) {
   sonde_free(text);
 }
 
+static void put_outcome(sonde_json_out *out, const sonde_log_entry *e) {
+  assert(!e->interrupted);
+  sonde_json_put_real(out, "score", e->score, 6);
+  sonde_json_put_bool(out, "passed", e->passed);
+  sonde_json_put_bool(out, "correct", e->correct);
+  sonde_json_put_real(out, "seconds", e->metrics.time_s, 6);
+}
+
 void class_results_tell(class_results *results, const char *home, sonde_door *door) {
   struct stat about;
   sonde_exam_log *log = NULL;
@@ -51,10 +59,7 @@ void class_results_tell(class_results *results, const char *home, sonde_door *do
       sonde_json_put_text(&list, "protocol", e->protocol);
       sonde_json_put_text(&list, "guidance", e->guidance);
       sonde_json_put_text(&list, "date", e->date);
-      sonde_json_put_real(&list, "score", e->score, 6);
-      sonde_json_put_bool(&list, "passed", e->passed);
-      sonde_json_put_bool(&list, "correct", e->correct);
-      sonde_json_put_real(&list, "seconds", e->metrics.time_s, 6);
+      put_outcome(&list, e);
       sonde_json_put_integer(&list, "hints", e->metrics.hints);
       sonde_json_end(&list);
       const char *const texts[] = {e->date,       e->trainee,  e->case_id,
@@ -75,8 +80,6 @@ void class_results_tell(class_results *results, const char *home, sonde_door *do
     sonde_file_discard(list.file);
     sonde_file_discard(one.file);
     sonde_file_discard(table);
-  }
-  if (status) {
     sonde_free(entries);
     return;
   }
@@ -102,10 +105,7 @@ char *class_results_since(class_results *results, const char *trainee, const cha
     sonde_json_begin_object(&out, NULL);
     sonde_json_put_text(&out, "id", e->id);
     sonde_json_put_text(&out, "title", e->case_title);
-    sonde_json_put_real(&out, "score", e->score, 6);
-    sonde_json_put_bool(&out, "passed", e->passed);
-    sonde_json_put_bool(&out, "correct", e->correct);
-    sonde_json_put_real(&out, "seconds", e->metrics.time_s, 6);
+    put_outcome(&out, e);
     sonde_json_end(&out);
   }
   pthread_mutex_unlock(&results->lock);

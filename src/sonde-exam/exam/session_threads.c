@@ -24,23 +24,16 @@ static void *record_main(void *argument) {
   return NULL;
 }
 
-// Passes of the solid, and the places that come: one looks as often as ticks come, the other as
-// often as passes do.
-static void *pass_main(void *argument) {
-  sonde_session *session = argument;
+// Does work of the solid whenever there is some, and looks for it so often.
+static void *tend(sonde_session *session, bool (*work)(sonde_solid_leg *), double nap_s) {
   while (!atomic_load_explicit(&session->stop_solid, memory_order_acquire))
-    if (!sonde_solid_leg_work(session->subject->solid))
-      sonde_clock_sleep_until(sonde_clock_now() + 0.5e-3);
+    if (!work(session->subject->solid)) sonde_clock_sleep_until(sonde_clock_now() + nap_s);
   return NULL;
 }
 
-static void *place_main(void *argument) {
-  sonde_session *session = argument;
-  while (!atomic_load_explicit(&session->stop_solid, memory_order_acquire))
-    if (!sonde_solid_leg_build(session->subject->solid))
-      sonde_clock_sleep_until(sonde_clock_now() + 10e-3);
-  return NULL;
-}
+static void *pass_main(void *session) { return tend(session, sonde_solid_leg_work, 0.5e-3); }
+
+static void *place_main(void *session) { return tend(session, sonde_solid_leg_build, 10e-3); }
 
 static sonde_status launch(pthread_t *thread, void *(*body)(void *), sonde_session *session,
                            bool *running, sonde_error *error) {

@@ -39,6 +39,8 @@ static inline uint32_t sonde_grid_shape_node(const sonde_grid_shape *s, uint32_t
   return (level * s->u_count + u % s->u_count) * s->v_count + v;
 }
 
+// @return ARGUMENT for a model that no ring can be made of: without a bone, or cut
+sonde_status sonde_hexes_ring_check(const sonde_model *model, sonde_error *error);
 // The ring of a leg whose columns an interior has, of which only what does not move is read.
 sonde_status sonde_hexes_ring_of(const sonde_interior *interior, const sonde_site *site,
                                  const sonde_hexes_def *def, sonde_hexes *mesh, sonde_error *error);

@@ -2,11 +2,11 @@
 #include "leg_place.h"
 
 #include "base/base.h"
+#include "base/clock.h"
 #include "grid.h"
 #include "haptics/motion.h"
 
 #include <string.h>
-#include <time.h>
 
 static const double back_m = 0.15, above_m = 0.04; // a probe looks for skin from behind to ahead
 static const double around_m = 70e-3;              // skin of the model that moves
@@ -26,14 +26,10 @@ sonde_status sonde_solid_leg_create(const sonde_solid_leg_def *def, sonde_solid_
                                     sonde_error *error) {
   SONDE_ASSERT(def != NULL && def->model && def->skin && def->probes && leg != NULL);
   *leg = NULL;
-  if (!def->columns)
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "the model has no bone that could hold the hyperelastic solid");
-  if (def->model->edge_share != NULL)
-    return sonde_fail(error, SONDE_ARGUMENT,
-                      "the model's skin is cut, which the hyperelastic solid's cannot be");
-  const sonde_status status = sonde_equilibrium_check(&def->live.solid, error);
+  sonde_status status = sonde_hexes_ring_check(def->model, error);
+  if (!status) status = sonde_equilibrium_check(&def->live.solid, error);
   if (status) return status;
+  SONDE_ASSERT(def->columns != NULL);
   *leg = SONDE_NEW(sonde_solid_leg, 1);
   if (!*leg) return sonde_fail_memory(error);
   (*leg)->def = *def;
@@ -135,12 +131,6 @@ static sonde_status make_place(const sonde_solid_leg *leg, sonde_pose pose, uint
   return status;
 }
 
-static double cpu_s(void) {
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 bool sonde_solid_leg_work(sonde_solid_leg *leg) {
   SONDE_ASSERT(leg != NULL);
   // Announced first: what serves when it has been announced is not freed meanwhile.
@@ -149,11 +139,11 @@ bool sonde_solid_leg_work(sonde_solid_leg *leg) {
     place = atomic_load(&leg->current);
     atomic_store(&leg->working, place);
   } while (place != atomic_load(&leg->current));
-  const double before_s = cpu_s();
+  const double before_s = sonde_clock_cpu();
   const uint32_t factors = place ? place->live->counts.factors : 0;
   const bool worked = place && sonde_solid_live_work(place->live);
   if (worked) {
-    const double spent_s = cpu_s() - before_s;
+    const double spent_s = sonde_clock_cpu() - before_s;
     ++leg->passes.passes, leg->passes.factors += place->live->counts.factors - factors;
     leg->passes.pass_s += spent_s;
     leg->passes.pass_most_s = fmax(leg->passes.pass_most_s, spent_s);
@@ -166,14 +156,14 @@ bool sonde_solid_leg_build(sonde_solid_leg *leg) {
   SONDE_ASSERT(leg != NULL);
   const uint32_t wanted = atomic_load_explicit(&leg->wanted, memory_order_acquire);
   if (wanted == atomic_load_explicit(&leg->built, memory_order_relaxed)) return false;
-  const double before_s = cpu_s();
+  const double before_s = sonde_clock_cpu();
   retire(leg, leg->given_back, false);
   leg->given_back = NULL;
   if (leg->step == SONDE_LEG_MAKE)
     (void)make_place(leg, leg->wanted_pose, leg->wanted_probe, &leg->coming, NULL);
   else
     sonde_live_walk(leg->coming->live, leg->wanted_pose);
-  leg->builds.build_s += cpu_s() - before_s;
+  leg->builds.build_s += sonde_clock_cpu() - before_s;
   atomic_store_explicit(&leg->built, wanted, memory_order_release);
   return true;
 }

@@ -39,15 +39,22 @@ static sonde_vec3 place_in_ring(const void *user, double level, uint32_t u, uint
   return v_madd(p, bend.y + x * sin(theta), r->in->e2);
 }
 
+sonde_status sonde_hexes_ring_check(const sonde_model *model, sonde_error *error) {
+  if (model->femur.face_count == 0)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "the model has no bone that could hold the hyperelastic solid");
+  if (model->edge_share != NULL)
+    return sonde_fail(error, SONDE_ARGUMENT,
+                      "the model's skin is cut, which the hyperelastic solid's cannot be");
+  return SONDE_OK;
+}
+
 sonde_status sonde_hexes_ring(const sonde_model *model, const sonde_site *site,
                               const sonde_hexes_def *def, sonde_hexes *mesh, sonde_error *error) {
   SONDE_ASSERT(model != NULL && site != NULL && mesh != NULL);
   sonde_interior *in = NULL;
-  if (model->femur.face_count == 0)
-    return sonde_fail(error, SONDE_ARGUMENT, "the model has no bone that could hold a ring");
-  if (model->edge_share != NULL)
-    return sonde_fail(error, SONDE_ARGUMENT, "the skin is cut: a ring has no lips");
-  sonde_status status = sonde_interior_create(model, &in, error);
+  sonde_status status = sonde_hexes_ring_check(model, error);
+  if (!status) status = sonde_interior_create(model, &in, error);
   if (!status) status = sonde_hexes_ring_of(in, site, def, mesh, error);
   sonde_interior_destroy(in);
   return status;

@@ -1,4 +1,4 @@
-// Monotonic clock and absolute sleep (an absolute wake-up time does not drift).
+// Clocks and absolute sleep (an absolute wake-up time does not drift).
 #include "base/clock.h"
 #include "base/base.h"
 
@@ -6,11 +6,15 @@
 #include <math.h>
 #include <time.h>
 
-double sonde_clock_now(void) {
+static double seconds_of(clockid_t clock) {
   struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
+  clock_gettime(clock, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
+
+double sonde_clock_now(void) { return seconds_of(CLOCK_MONOTONIC); }
+
+double sonde_clock_cpu(void) { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
 
 void sonde_clock_sleep_until(double seconds) {
   SONDE_ASSERT(isfinite(seconds));

@@ -1,4 +1,4 @@
-// Monotonic time for real-time threads.
+// Time for real-time threads.
 #ifndef SONDE_SRC_CLOCK_H
 #define SONDE_SRC_CLOCK_H
 
@@ -6,6 +6,9 @@
 
 // Seconds since an arbitrary moment; never goes back. @thread any (tick)
 SONDE_LINK double sonde_clock_now(void);
+
+// Processor time that the calling thread has spent, seconds. @thread any (tick)
+SONDE_LINK double sonde_clock_cpu(void);
 
 // Sleeps until sonde_clock_now() reaches `seconds`; returns at once when that is in the past.
 // @thread any but the tick itself: only the scheduler around it

@@ -1,10 +1,9 @@
 // A frame: the stages in their order, and the constants that they share.
 #include "base/base.h"
+#include "base/clock.h"
 #include "echo/bands.h"
 #include "echo/cubes.h"
 #include "echo/lines.h"
-
-#include <time.h>
 
 _Static_assert((int)SONDE_PSF_STEPS == SONDE_ECHO_PREPARE_STEPS, "steps of a beam");
 
@@ -169,9 +168,7 @@ void sonde_echo_scatter(sonde_echo *echo) {
 
 // Processor time since *from, which moves on.
 static double lap(double *from) {
-  struct timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  double now = (double)t.tv_sec + 1e-9 * (double)t.tv_nsec, since = now - *from;
+  const double now = sonde_clock_cpu(), since = now - *from;
   *from = now;
   return since;
 }
