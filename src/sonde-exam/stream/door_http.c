@@ -111,7 +111,8 @@ static bool reply_lms(sonde_door *door, door_connection *c, const page_request *
   }
   int code = place ? 200 : reads ? 404 : 401;
   if (!place) {
-    atomic_fetch_add(&door->wrong, 1);
+    // A system asks from its first second on, before the learner has joined: that is no guess.
+    if (!reads) atomic_fetch_add(&door->wrong, 1);
   } else if (reads) {
     code = door->def.follow(door->def.user, place, door->ticket[place - 1].since_unix_s, &text);
   } else {
