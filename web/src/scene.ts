@@ -216,7 +216,7 @@ export class LegScene {
     this.orbit.touches = { ONE: null, TWO: null }; // one finger beside the leg turns (input.ts)
     this.orbit.minDistance = 220;
     this.orbit.maxDistance = FARTHEST_MM;
-    this.orbit.addEventListener("change", () => (this.spoil()));
+    this.orbit.addEventListener("change", () => this.spoil());
   }
 
   /** The middle and the length of what is to be seen; a patient of another length is looked at anew. */

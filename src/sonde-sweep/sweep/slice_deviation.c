@@ -1,7 +1,8 @@
-// How sure a picture between frames is. Of each scale of the frames the fall of likeness with the
-// distance is known (slice_krige.c). With the weights that the picture gives to the frames on both
-// sides of a pixel it tells the square error to be expected there, over the square by which both
-// frames should differ; by how much they do differ about the pixel is seen.
+// How sure a picture between frames is. The likeness of frames falls with their distance, for each
+// scale as slice_krige.c has fitted it. From likeness and from the weights that a picture gives to
+// the frames on both sides of a pixel follows the expected square error of the pixel, as a share of
+// the square by which these two frames should differ. The square by which they do differ about the
+// pixel, times that share, is the square of the deviation.
 #include "sweep/slice.h"
 
 enum { REACH = 4 };                    // pixels from a window's middle to its end
@@ -13,18 +14,17 @@ typedef struct foot {
   double u, v, far_m;
 } foot;
 
-// Mean square difference of two frames in windows about a pixel's feet on them.
+// Mean square difference of two frames in the part of a window about a pixel's feet that both have.
 static double difference_at(const sonde_slicer *s, const foot *a, const foot *b) {
   const int wide = (int)s->width, ua = (int)lround(a->u), va = (int)lround(a->v);
   const int ub = (int)lround(b->u), vb = (int)lround(b->v);
+  const int left = (int)fmax(-REACH, (double)s->low[0] - fmin(ua, ub));
+  const int right = (int)fmin(REACH, (double)s->high[0] - fmax(ua, ub));
+  const int top = (int)fmax(-REACH, (double)s->low[1] - fmin(va, vb));
+  const int bottom = (int)fmin(REACH, (double)s->high[1] - fmax(va, vb));
   double square = 0, count = 0;
-  for (int y = -REACH; y <= REACH; ++y)
-    for (int x = -REACH; x <= REACH; ++x) {
-      const int low_u = ua < ub ? ua + x : ub + x, high_u = ua < ub ? ub + x : ua + x;
-      const int low_v = va < vb ? va + y : vb + y, high_v = va < vb ? vb + y : va + y;
-      if (low_u < (int)s->low[0] || high_u > (int)s->high[0] || low_v < (int)s->low[1] ||
-          high_v > (int)s->high[1])
-        continue;
+  for (int y = top; y <= bottom; ++y)
+    for (int x = left; x <= right; ++x) {
       const int off =
           a->plane->pixels[(va + y) * wide + ua + x] - b->plane->pixels[(vb + y) * wide + ub + x];
       square += off * off, count += 1;
@@ -32,7 +32,7 @@ static double difference_at(const sonde_slicer *s, const foot *a, const foot *b)
   return fmax(square / count, ROUNDED); // the feet themselves are inside
 }
 
-// Expected square error of a place between n frames at `at`, itself at 0.
+// Expected square error of a pixel at 0 on a line, made from n frames that it meets at `at`.
 static double expected_square(const sonde_slicer *s, int n, const double *at) {
   double square = 0, w[2] = {1, 0};
   if (n == 2) w[0] = fabs(at[1]) / (at[1] - at[0]), w[1] = 1 - w[0];
