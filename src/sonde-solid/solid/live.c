@@ -292,9 +292,15 @@ void sonde_live_walk(sonde_solid_live *l, sonde_pose pose) {
   for (int n = 0, there = 0; n < PASSES_MOST && there < SETTLING && !(n > 0 && l->rests); ++n) {
     atomic_fetch_add(&l->asked, 1);
     (void)sonde_solid_live_work(l);
-    there += !(sonde_equilibrium_way(l->e->pose, pose) > 0);
+    there += sonde_equilibrium_way(l->e->pose, pose) < sonde_live_still_m;
   }
   l->serving = atomic_load(&l->asked) & 1;
+  // The tick's contact begins where the skin is: of skin at rest deep inside the probe, what is
+  // nearest are the probe's sides.
+  for (uint32_t k = 0; k < l->e->zone_count; ++k) {
+    const uint32_t node = l->e->zone_node[k];
+    l->skin[k] = v_add(l->e->mesh->node[node], l->e->moved[node]);
+  }
 }
 
 sonde_solid_live_counts sonde_solid_live_count(const sonde_solid_live *l) {
