@@ -112,13 +112,25 @@ typedef struct sonde_echo_times {
 } sonde_echo_times;
 SONDE_API sonde_echo_times sonde_echo_last_times(const sonde_echo *echo); /**< @thread owner */
 
-/** Motion of the blood, a function of the time alone. Speeds are means over the section and over
- *  time; the profile is parabolic. The artery's speed follows its pulse above the diastolic
- * pressure. Vein and artery flow opposite ways; behind a plug of clot the vein's blood stands. */
+/** Blood of one vessel in a picture, such as a network of veins lets flow. */
+typedef struct sonde_vessel_blood {
+  double path_m;    /**< of the mean flow so far, along the vessel's axis */
+  double speed_m_s; /**< mean over the section now, along the axis */
+  double rouleaux;  /**< how far the red cells of slow blood have stuck together, 0 to 1: then it is
+                         12 dB brighter, in streaks */
+  double shut;      /**< how far the cusps of its valves have come together, 0 to 1 */
+} sonde_vessel_blood;
+
+/** Motion of the blood. Profiles are parabolic. Without `blood` it is a function of the time alone:
+ *  speeds are means over the section and over time, the artery's follows its pulse above the
+ *  diastolic pressure, veins flow against the z of the leg and arteries along it; behind a plug of
+ *  clot a vein's blood stands. */
 typedef struct sonde_echo_flow {
-  double t_s;                    /**< default 0 */
-  double vein_m_s, artery_m_s;   /**< default 0.08 and 0.13 */
-  sonde_circulation circulation; /**< gives the pulse */
+  double t_s;                      /**< default 0 */
+  double vein_m_s, artery_m_s;     /**< default 0.08 and 0.13 */
+  sonde_circulation circulation;   /**< gives the pulse */
+  const sonde_vessel_blood *blood; /**< [vessels of the interior] borrowed until another flow is
+                                      set; NULL (default): from the time */
 } sonde_echo_flow;
 SONDE_API sonde_echo_flow sonde_echo_flow_default(void); /**< @thread any */
 /** Blood of the following renders; finite fields. @thread owner */

@@ -133,6 +133,8 @@ SONDE_API void sonde_flow_scene_run(sonde_flow_scene *scene, sonde_flow *flow, d
 typedef struct sonde_flow_scene_memory {
   sonde_flow flow; /**< as the last run left it */
   double profile_m_s[SONDE_FLOW_SEGMENTS][SONDE_FLOW_RINGS], artery_m_s[SONDE_FLOW_RINGS];
+  double clearing_m3_s[SONDE_FLOW_SEGMENTS]; /**< the flow by which rouleaux form and break up */
+  double path_m[2 + SONDE_BRANCHES];         /**< of each vessel's blood */
 } sonde_flow_scene_memory;
 /** @thread owner; no allocation */
 SONDE_API sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_scene *scene);
@@ -145,6 +147,14 @@ SONDE_API void sonde_flow_scene_recall(sonde_flow_scene *scene,
  *  @param[out] cells [SONDE_COLOUR_CELLS] @thread owner; no allocation */
 SONDE_API void sonde_flow_scene_cells(const sonde_flow_scene *scene, const sonde_echo *echo,
                                       const sonde_colour_box *box, sonde_colour_cell *cells);
+/** From the next run on the blood below is that of the sections nearest to a probe's axis.
+ *  @thread owner; no allocation */
+SONDE_API void sonde_flow_scene_show(sonde_flow_scene *scene, sonde_pose world_from_probe);
+/** The blood there of each vessel of the interior, for the picture of sonde_echo_set_flow(). It
+ *  stands where probe or clot close the vein. Red cells stick together where it has been slow for
+ *  seconds, and part where it is fast; cusps follow it.
+ *  @return [vessels of the interior] of the last run; owned by the scene @thread owner */
+SONDE_API const sonde_vessel_blood *sonde_flow_scene_blood(const sonde_flow_scene *scene);
 /** Mean velocity of a vessel of the interior towards the heart (veins) or away from it (arteries)
  *  in the section that lies nearest to the probe's axis, m/s; 0 when it is closed.
  *  @thread owner */

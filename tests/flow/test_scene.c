@@ -6,6 +6,7 @@
 #include "interior/tube.h"
 
 #include <math.h>
+#include <string.h>
 
 static const double length = 0.3, radius = 0.08;
 static const double face_m = 0.06; // radius of a curved face
@@ -356,6 +357,83 @@ static void test_fan_colour(void **unused) {
   close_leg(&l);
 }
 
+// What the picture's blood does over some seconds of the network, with a share of its inflow.
+static sonde_vessel_blood run_on(sonde_flow_scene *scene, sonde_flow *flow, double share,
+                                 double seconds) {
+  flow->def.inflow_m3_s = share * sonde_flow_def_default(NULL).inflow_m3_s;
+  sonde_flow_scene_show(scene, tube_pose(radius, length / 2));
+  for (double until = flow->time_s + seconds; flow->time_s < until - 1e-6;)
+    sonde_flow_scene_run(scene, flow, fmin(flow->time_s + 0.02, until));
+  return sonde_flow_scene_blood(scene)[0];
+}
+
+// The picture's blood goes as far as the mean velocity takes it, to the heart in the vein and from
+// it in the artery. Where little comes in, its red cells stick together in seconds, as far as the
+// shear lets them, and part when it is fast again.
+static void test_blood_of_pictures(void **unused) {
+  (void)unused;
+  leg l;
+  sonde_flow_scene *scene = NULL;
+  sonde_flow flow;
+  sonde_vessel_state vein;
+  open_along(&l, &scene, &flow, &vein);
+  const sonde_pose across = tube_pose(radius, length / 2);
+  const double heart = vein.axis.z > 0 ? -1 : 1; // the foot is at the greater z
+  const sonde_vessel_blood before = run_on(scene, &flow, 1, 0.2);
+  const double artery_m = sonde_flow_scene_blood(scene)[1].path_m;
+  sonde_vessel_blood b = run_on(scene, &flow, 1, 1);
+  const double mean = sonde_flow_scene_velocity(scene, 0, across);
+  print_message("in 1 s %.2f of %.2f mm, artery %.2f mm; rouleaux %.3f, cusps %.2f\n",
+                1e3 * heart * (b.path_m - before.path_m), 1e3 * mean,
+                -1e3 * heart * (sonde_flow_scene_blood(scene)[1].path_m - artery_m), b.rouleaux,
+                b.shut);
+  assert_near(heart * (b.path_m - before.path_m) / mean, 1, 0.02);
+  assert_near(heart * b.speed_m_s, mean, 1e-12);
+  assert_true(-heart * (sonde_flow_scene_blood(scene)[1].path_m - artery_m) > 0.02);
+  assert_true(b.rouleaux < 0.3 && b.shut < 0.4);
+  const sonde_vessel_blood shortly = run_on(scene, &flow, 0.05, 1);
+  b = run_on(scene, &flow, 0.05, 79);
+  const double shear_per_s =
+      8 * fabs(b.speed_m_s) / (3 * sqrt(vein.half_short_m * vein.half_long_m));
+  const double settled = 1 / (1 + pow(shear_per_s / 8, 2));
+  const sonde_vessel_blood again = run_on(scene, &flow, 1, 30);
+  print_message("a twentieth comes in for 1 s: rouleaux %.3f; 80 s: %.3f of %.3f at %.2f cm/s; all "
+                "again: %.3f\n",
+                shortly.rouleaux, b.rouleaux, settled, 100 * b.speed_m_s, again.rouleaux);
+  assert_true(settled > 0.3 && fabs(b.rouleaux - settled) < 0.02);
+  assert_true(shortly.rouleaux < 0.3 * settled && again.rouleaux < 0.1 * settled);
+  // A strain stops the blood at once; red cells take their seconds.
+  flow.def.valsalva_from_s = flow.time_s, flow.def.valsalva_to_s = flow.time_s + 12;
+  const sonde_vessel_blood stopped = run_on(scene, &flow, 1, 1), late = run_on(scene, &flow, 1, 8);
+  print_message("strain for 1 s: %.2f cm/s, rouleaux %.3f; 9 s: %.2f cm/s, %.3f\n",
+                100 * stopped.speed_m_s, stopped.rouleaux, 100 * late.speed_m_s, late.rouleaux);
+  assert_true(fabs(stopped.speed_m_s) < 1e-3 && stopped.rouleaux < 0.2 && late.rouleaux > 0.6);
+  sonde_flow_scene_destroy(scene);
+  close_leg(&l);
+}
+
+// Blood that falls back through valves that leak a little brings their cusps together, and goes
+// away from the heart.
+static void test_cusps(void **unused) {
+  (void)unused;
+  leg l;
+  sonde_flow_scene *scene = NULL;
+  sonde_flow flow;
+  sonde_vessel_state vein;
+  open_along(&l, &scene, &flow, &vein);
+  flow.def.leak = 0.3;
+  flow.def.valsalva_from_s = flow.time_s + 0.1, flow.def.valsalva_to_s = flow.time_s + 5;
+  sonde_vessel_blood back = {0};
+  for (int k = 0; k < 60; ++k) {
+    const sonde_vessel_blood b = run_on(scene, &flow, 1, 0.02);
+    if (b.shut > back.shut) back = b;
+  }
+  print_message("falls back at %.2f cm/s: cusps %.2f\n", 100 * back.speed_m_s, back.shut);
+  assert_true(back.speed_m_s * (vein.axis.z > 0 ? 1 : -1) > 2e-3 && back.shut > 0.6);
+  sonde_flow_scene_destroy(scene);
+  close_leg(&l);
+}
+
 static void test_cleans(void **unused) {
   (void)unused;
   const sonde_gate_settings usual = sonde_gate_settings_default();
@@ -371,7 +449,8 @@ int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_conserves),  cmocka_unit_test(test_gate),
       cmocka_unit_test(test_window),     cmocka_unit_test(test_fan_gate),
-      cmocka_unit_test(test_fan_colour), cmocka_unit_test(test_cleans)};
+      cmocka_unit_test(test_fan_colour), cmocka_unit_test(test_blood_of_pictures),
+      cmocka_unit_test(test_cusps),      cmocka_unit_test(test_cleans)};
   if (argc > 1) cmocka_set_test_filter(argv[1]);
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -259,9 +259,20 @@ static void pictures_show_cusps(void **state) {
     const sonde_vec3 up = cusps_at(m->map, root, &which).axis;
     const double grey = lumen_grey(echo, m, end, up, at.radius_m),
                  below = lumen_grey(echo, m, v_madd(root, -2e-3, up), up, at.radius_m);
-    print_message("%.0f mm: grey %.1f through the cusps, %.1f below\n", 1e3 * valve.arc_m, grey,
-                  below);
-    ++shown, brighter += grey > below + 3;
+    // Cusps that open lean against the wall and leave the lumen's middle dark.
+    sonde_vessel_blood blood[2 + SONDE_BRANCHES] = {{.path_m = 0}};
+    sonde_echo_flow flow = sonde_echo_flow_default();
+    double leaning[2];
+    flow.blood = blood;
+    for (int k = 0; k < 2; ++k) {
+      for (size_t v = 0; v < SONDE_COUNT_OF(blood); ++v) blood[v].shut = k ? 0.2 : 0.7;
+      sonde_echo_set_flow(echo, &flow);
+      leaning[k] = lumen_grey(echo, m, end, up, 0.6 * at.radius_m);
+    }
+    flow.blood = NULL, sonde_echo_set_flow(echo, &flow);
+    print_message("%.0f mm: grey %.1f through the cusps, %.1f below; middle %.1f shut, %.1f open\n",
+                  1e3 * valve.arc_m, grey, below, leaning[0], leaning[1]);
+    ++shown, brighter += grey > below + 3 && leaning[0] > leaning[1] + 3;
   }
   assert_true(shown >= 2 && brighter == shown);
   sonde_echo_destroy(echo);

@@ -19,6 +19,7 @@ typedef struct sonde_hand_moment {
 // Of one image.
 typedef struct sonde_duplex_moment {
   double time_s;
+  sonde_pose probe;
   const sonde_duplex_controls *controls;
   const sonde_circulation *circulation; // NULL: breath and beat as flow has them, no strain
   sonde_hand_moment hand;
@@ -36,7 +37,7 @@ typedef struct sonde_duplex {
   sonde_flow_scene *scene;
   sonde_colour *colour;
   sonde_colour_cell *cells; // [SONDE_COLOUR_CELLS]
-  bool flows;               // the network runs: some Doppler is on
+  bool flows;               // the network runs
   // tissue of the last picture with colour: at rest, by line and depth
   bool seen;
   double seen_s, seen_aperture_m, seen_depth_m;
@@ -54,9 +55,11 @@ void sonde_duplex_destroy(sonde_duplex *duplex); // NULL is fine
 // `wanted` with every number usable: within its range, or from `before` where it is none.
 sonde_duplex_controls sonde_duplex_clean(const sonde_duplex_controls *wanted,
                                          const sonde_duplex_controls *before);
-// The blood up to an image, whose interior is updated: the network starts when Doppler is switched
-// on and goes on from image to image (hot).
+// The blood up to an image, whose interior is updated: the network starts with the first image and
+// goes on from image to image (hot).
 void sonde_duplex_follow(sonde_duplex *duplex, const sonde_duplex_moment *moment);
+// The blood of the vessels in that image, owned by the duplex (hot).
+const sonde_vessel_blood *sonde_duplex_blood(const sonde_duplex *duplex);
 // A stage of drawing: the cells' tissue moves as it came to its places since the last picture,
 // blood moves with it; behind bone and where no gel or skin is nothing comes back (hot).
 void sonde_duplex_move(sonde_duplex *duplex, const sonde_duplex_moment *moment,

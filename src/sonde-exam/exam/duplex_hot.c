@@ -22,10 +22,6 @@ void sonde_duplex_follow(sonde_duplex *d, const sonde_duplex_moment *now) {
   const bool gated = now->controls->gated;
   if (now->controls->shown == SONDE_DUPLEX_OFF) d->seen = false;
   if (!gated) sonde_gate_forget(d->gate);
-  if (now->controls->shown == SONDE_DUPLEX_OFF && !gated) {
-    d->flows = false;
-    return;
-  }
   // Patient and hand now; veins as probe and clots leave them.
   sonde_flow_def def = d->body.def;
   const sonde_circulation *c = now->circulation;
@@ -47,7 +43,13 @@ void sonde_duplex_follow(sonde_duplex *d, const sonde_duplex_moment *now) {
   }
   d->flows = true, flow.def = def;
   sonde_flow_scene_listen(d->scene, gated ? d->gate : NULL);
+  sonde_flow_scene_show(d->scene, now->probe);
   sonde_flow_scene_run(d->scene, &flow, now->time_s);
+}
+
+const sonde_vessel_blood *sonde_duplex_blood(const sonde_duplex *d) {
+  SONDE_ASSERT(d != NULL);
+  return sonde_flow_scene_blood(d->scene);
 }
 
 // What the picture shows at a place of its plane, at its rim beside it.

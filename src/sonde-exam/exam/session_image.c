@@ -52,6 +52,7 @@ static double couple(sonde_session *session, const unsigned char *slot) {
 static sonde_duplex_moment duplex_moment(const sonde_session *session,
                                          const sonde_surface_slot *head) {
   return (sonde_duplex_moment){.time_s = (double)head->snapshot.tick * session->dt_s,
+                               .probe = head->snapshot.world_from_probe,
                                .controls = &head->controls.duplex,
                                .circulation =
                                    session->subject->setup.circulate ? &head->circulation : NULL,
@@ -187,6 +188,7 @@ void sonde_session_draw(sonde_session *session) {
     sonde_echo_flow flow = sonde_echo_flow_default();
     flow.t_s = (double)head->snapshot.tick * session->dt_s;
     if (session->subject->setup.circulate) flow.circulation = head->circulation;
+    if (session->duplex) flow.blood = sonde_duplex_blood(session->duplex);
     sonde_echo_set_flow(session->echo, &flow);
     sonde_echo_render(session->echo, head->snapshot.world_from_probe, session->beam.aperture_m,
                       &head->pathology, &settings, &image);

@@ -138,12 +138,48 @@ static void share_out(sonde_flow_scene *s) {
   }
 }
 
+// What ran through the segments, m3, and along the arteries, m, since the run began moves the blood
+// of the sections in the picture. Red cells stick together where the blood shears slower than 8
+// 1/s; cusps stand half-way to each other in standing blood, open with it and shut as it falls
+// back.
+static void move_blood(sonde_flow_scene *s, const double *ran_m3, double artery_m) {
+  const double slow_per_s = 8, rest = 0.5, opens = 0.32, shuts = 0.45, opening_m_s = 0.03,
+               shutting_m_s = 0.01;
+  for (uint32_t v = 0; v < s->interior->vessel_count; ++v) {
+    if (s->interior->course[v].count == 0) continue;
+    const uint32_t i = s->shown[v];
+    const scene_section *at = &s->section[v][i];
+    const double gain = scene_gain(s, v, i), along = at->upwards;
+    sonde_vessel_blood *blood = &s->blood[v];
+    if (s->interior->course[v].kind == SONDE_VESSEL_ARTERY) {
+      *blood = (sonde_vessel_blood){.path_m = blood->path_m - along * gain * artery_m,
+                                    .speed_m_s = -along * gain * s->artery_m_s,
+                                    .shut = rest};
+      continue;
+    }
+    const sonde_vessel_state *now = &s->interior->state[v][i];
+    const double radius_m = sqrt(now->half_short_m * now->half_long_m * scene_open(s, v, i));
+    const double shear = // of a parabola, mean over the lumen
+        radius_m > 0 ? 8 * gain * s->clearing_m3_s[at->segment] / (3 * radius_m * slow_per_s) : 0;
+    const double speed = gain * s->flow.flow_m3_s[at->segment], size = fabs(speed);
+    *blood = (sonde_vessel_blood){.path_m = blood->path_m + along * gain * ran_m3[at->segment],
+                                  .speed_m_s = along * speed,
+                                  .rouleaux = 1 / (1 + shear * shear),
+                                  .shut = speed > 0 ? rest - opens * size / (size + opening_m_s)
+                                                    : rest + shuts * (1 - s->flow.def.leak) * size /
+                                                                 (size + shutting_m_s)};
+  }
+}
+
 void sonde_flow_scene_run(sonde_flow_scene *s, sonde_flow *flow, double until_s) {
   SONDE_ASSERT(s && flow && isfinite(until_s));
   const double step_s = 1e-3;
   // One profile for all arteries, of the size of the thigh's.
   const double artery_radius_m = 3.5e-3;
   const double beats_hz = flow->def.heart_rate_hz;
+  // Rouleaux form in seconds and break up in less than one.
+  const double form = exp(-step_s / 5), clear = exp(-step_s / 0.3);
+  double ran_m3[SONDE_FLOW_SEGMENTS] = {0}, artery_m = 0;
   if (!(flow->time_s == s->flow.time_s)) {
     enum { SAMPLES = 64 };
     double wave[SAMPLES];
@@ -151,8 +187,10 @@ void sonde_flow_scene_run(sonde_flow_scene *s, sonde_flow *flow, double until_s)
     const double beat = beats_hz * flow->time_s;
     sonde_flow_pulsed(wave, SAMPLES, artery_radius_m, beats_hz, beat - floor(beat),
                       s->artery_profile);
-    for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k)
+    for (int k = 0; k < SONDE_FLOW_SEGMENTS; ++k) {
       sonde_flow_steady(sonde_flow_velocity(flow, (sonde_flow_segment)k), s->profile[k]);
+      s->clearing_m3_s[k] = fabs(flow->flow_m3_s[k]);
+    }
   }
   s->flow = *flow;
   share_out(s);
@@ -163,14 +201,20 @@ void sonde_flow_scene_run(sonde_flow_scene *s, sonde_flow *flow, double until_s)
       if (area > 0)
         sonde_flow_follow(s->profile[k], sqrt(area / SONDE_PI),
                           sonde_flow_velocity(&s->flow, (sonde_flow_segment)k), step_s);
+      const double through = s->flow.flow_m3_s[k], size = fabs(through);
+      ran_m3[k] += step_s * through;
+      s->clearing_m3_s[k] =
+          size + (size > s->clearing_m3_s[k] ? clear : form) * (s->clearing_m3_s[k] - size);
     }
     s->artery_m_s = sonde_flow_artery(beats_hz * s->flow.time_s);
+    artery_m += step_s * s->artery_m_s;
     sonde_flow_follow(s->artery_profile, artery_radius_m, s->artery_m_s, step_s);
     if (s->gate) gate_step(s->gate, s, step_s);
   }
   s->artery_m_s = sonde_flow_artery(beats_hz * s->flow.time_s);
   *flow = s->flow;
   share_out(s);
+  move_blood(s, ran_m3, artery_m);
 }
 
 sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_scene *s) {
@@ -178,6 +222,8 @@ sonde_flow_scene_memory sonde_flow_scene_remember(const sonde_flow_scene *s) {
   sonde_flow_scene_memory memory = {.flow = s->flow};
   memcpy(memory.profile_m_s, s->profile, sizeof s->profile);
   memcpy(memory.artery_m_s, s->artery_profile, sizeof s->artery_profile);
+  memcpy(memory.clearing_m3_s, s->clearing_m3_s, sizeof s->clearing_m3_s);
+  for (uint32_t v = 0; v < SONDE_VESSELS; ++v) memory.path_m[v] = s->blood[v].path_m;
   return memory;
 }
 
@@ -186,17 +232,38 @@ void sonde_flow_scene_recall(sonde_flow_scene *s, const sonde_flow_scene_memory 
   s->flow = memory->flow;
   memcpy(s->profile, memory->profile_m_s, sizeof s->profile);
   memcpy(s->artery_profile, memory->artery_m_s, sizeof s->artery_profile);
+  memcpy(s->clearing_m3_s, memory->clearing_m3_s, sizeof s->clearing_m3_s);
+  for (uint32_t v = 0; v < SONDE_VESSELS; ++v) s->blood[v].path_m = memory->path_m[v];
 }
 
-double sonde_flow_scene_velocity(const sonde_flow_scene *s, uint32_t vessel, sonde_pose pose) {
-  SONDE_ASSERT(s && vessel < s->interior->vessel_count);
+static uint32_t nearest_section(const sonde_flow_scene *s, uint32_t vessel, sonde_pose probe) {
   const sonde_interior *in = s->interior;
   uint32_t nearest = 0;
   double least = INFINITY;
   for (uint32_t i = 0; i < in->course[vessel].count; ++i) {
-    const sonde_vec3 at = pose_apply_inverse(pose, in->state[vessel][i].centre_m);
+    const sonde_vec3 at = pose_apply_inverse(probe, in->state[vessel][i].centre_m);
     const double beside = at.x * at.x + at.y * at.y;
     if (beside < least) least = beside, nearest = i;
   }
-  return isfinite(least) ? scene_mean(s, vessel, nearest) : 0;
+  return nearest;
+}
+
+void sonde_flow_scene_show(sonde_flow_scene *s, sonde_pose probe) {
+  SONDE_ASSERT(s != NULL);
+  for (uint32_t v = 0; v < s->interior->vessel_count; ++v)
+    s->shown[v] = nearest_section(s, v, probe);
+}
+
+const sonde_vessel_blood *sonde_flow_scene_blood(const sonde_flow_scene *s) {
+  SONDE_ASSERT(s != NULL);
+  return s->blood;
+}
+
+double sonde_flow_scene_velocity(const sonde_flow_scene *s, uint32_t vessel, sonde_pose pose) {
+  SONDE_ASSERT(s && vessel < s->interior->vessel_count);
+  if (s->interior->course[vessel].count == 0) return 0;
+  const uint32_t i = nearest_section(s, vessel, pose);
+  const bool artery = s->interior->course[vessel].kind == SONDE_VESSEL_ARTERY;
+  return scene_gain(s, vessel, i) *
+         (artery ? s->artery_m_s : s->flow.flow_m3_s[s->section[vessel][i].segment]);
 }

@@ -27,6 +27,11 @@ struct sonde_flow_scene {
   // Of a segment's flow: what runs through each of its veins; velocity in the main one, 1/m2.
   double part[SONDE_FLOW_SEGMENTS][SONDE_FLOW_VEINS], main_per_m2[SONDE_FLOW_SEGMENTS];
   struct sonde_gate *gate; // that hears the blood while it runs; NULL: none
+  // Each vessel's blood in the section that the picture shows, as the last run left it, and the
+  // flow of each segment by which rouleaux form and break up: it falls slowly.
+  uint32_t shown[SONDE_VESSELS];
+  sonde_vessel_blood blood[SONDE_VESSELS];
+  double clearing_m3_s[SONDE_FLOW_SEGMENTS];
 };
 
 // What gives blood its speed: the profile of a segment's main vein (below SONDE_FLOW_SEGMENTS), the
@@ -82,12 +87,6 @@ static inline double scene_gain(const sonde_flow_scene *s, uint32_t vessel, uint
   if (section->vein == SCENE_WHOLE) return section->share / area;
   if (section->vein == SCENE_OTHER) return s->main_per_m2[section->segment] * rest / area;
   return section->share * s->part[section->segment][section->vein] / area;
-}
-
-static inline double scene_mean(const sonde_flow_scene *s, uint32_t vessel, uint32_t i) {
-  return scene_gain(s, vessel, i) * (s->interior->course[vessel].kind == SONDE_VESSEL_ARTERY
-                                         ? s->artery_m_s
-                                         : s->flow.flow_m3_s[s->section[vessel][i].segment]);
 }
 
 #endif

@@ -19,6 +19,7 @@ enum {
 typedef struct blood_segment {
   splat_map map;
   double flowed;  // by the mean flow, in segments
+  double streaks; // share by which the amplitudes of streaks differ from each other
   double solid;   // share of the short axis that clot fills, from the far side
   uint32_t count; // streamlines
   uint32_t salt, vessel;

@@ -158,8 +158,17 @@ void sonde_bands_lay(sonde_echo *echo, uint32_t band) {
     splat_map one = from->map;
     for (uint32_t i = 0; i < from->count; i += AT_ONCE) {
       const uint32_t length = from->count - i < AT_ONCE ? from->count - i : AT_ONCE;
-      const stream_job job = {blood->z + i,  blood->sign + i, length, i,   from->flowed,
-                              from->segment, from->salt,      z,      sign};
+      const stream_job job = {.z = blood->z + i,
+                              .speed = blood->sign + i,
+                              .bundle = echo->bundle + i,
+                              .count = length,
+                              .first = i,
+                              .flowed = from->flowed,
+                              .streaks = from->streaks,
+                              .segment = from->segment,
+                              .salt = from->salt,
+                              .at = z,
+                              .sign = sign};
       echo->kernels->stream(&job);
       memcpy(x, blood->x + i, length * sizeof *x);
       memcpy(y, blood->y + i, length * sizeof *y);

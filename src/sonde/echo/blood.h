@@ -4,7 +4,7 @@
 
 #include "echo/echo.h"
 
-// Mean speed of a vessel's blood along it at the time of the flow, m/s.
-double sonde_blood_speed(const sonde_echo *echo, uint32_t which);
+// A vessel's blood at the time of the flow.
+sonde_vessel_blood sonde_blood_of(const sonde_echo *echo, uint32_t which);
 
 #endif

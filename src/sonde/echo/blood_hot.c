@@ -11,6 +11,9 @@
 #include "interior/vessels.h"
 
 enum { PULSE_STEPS = 64 };
+// Blood whose red cells stick together: its echo's power, and the share by which the amplitude of
+// its streaks differs.
+static const double most_rouleaux_db = 12, most_streaks = 1;
 
 // Pulses since t = 0, weighted by the pressure above the diastolic one: grows by 1 per beat.
 static double beats_of(const sonde_circulation *c, double t) {
@@ -57,21 +60,28 @@ static double map_segment(const sonde_echo *echo, const sonde_vessel_state *low,
   return fabsf(out->m[0][1]) <= 1 + beside ? SONDE_PI * half_short * half_long * length : 0;
 }
 
-// Path of the mean flow in a vessel since t = 0, m.
+// Path of the mean flow in a vessel since t = 0 by the time alone, m along its axis.
 static double path_of(const sonde_echo *echo, uint32_t which, double t_s) {
   const sonde_echo_flow *flow = &echo->flow;
   const double rate = flow->circulation.heart_rate_hz;
-  SONDE_ASSERT(which < echo->interior->vessel_count);
-  if (echo->interior->course[which].kind != SONDE_VESSEL_VEIN)
-    return rate > 0 ? -flow->artery_m_s / rate * beats_of(&flow->circulation, t_s)
-                    : -flow->artery_m_s * t_s;
+  const sonde_vessel_course *course = &echo->interior->course[which];
+  // The z of models of legs points to the foot.
+  const double distal = echo->interior->section[which][course->count / 2].axis.z > 0 ? 1 : -1;
+  if (course->kind != SONDE_VESSEL_VEIN)
+    return distal * flow->artery_m_s * (rate > 0 ? beats_of(&flow->circulation, t_s) / rate : t_s);
   if (sonde_echo_pathology(echo, which)->thrombus_fraction >= 1) return 0;
-  return flow->vein_m_s * t_s;
+  return -distal * flow->vein_m_s * t_s;
 }
 
-double sonde_blood_speed(const sonde_echo *echo, uint32_t which) {
+sonde_vessel_blood sonde_blood_of(const sonde_echo *echo, uint32_t which) {
+  SONDE_ASSERT(which < echo->interior->vessel_count);
+  if (echo->flow.blood) return echo->flow.blood[which];
   const double half_s = 5e-3, t = echo->flow.t_s;
-  return (path_of(echo, which, t + half_s) - path_of(echo, which, t - half_s)) / (2 * half_s);
+  return (sonde_vessel_blood){
+      .path_m = path_of(echo, which, t),
+      .speed_m_s =
+          (path_of(echo, which, t + half_s) - path_of(echo, which, t - half_s)) / (2 * half_s),
+      .shut = 0.5};
 }
 
 void sonde_echo_blood(sonde_echo *echo) {
@@ -82,14 +92,16 @@ void sonde_echo_blood(sonde_echo *echo) {
   for (uint32_t shown = 0; shown < echo->shown_count; ++shown) {
     const uint32_t which = echo->shown[shown], sections = in->course[which].count;
     if (sections < 2) continue;
-    const double flowed_m = path_of(echo, which, echo->flow.t_s);
+    const sonde_vessel_blood moves = sonde_blood_of(echo, which);
+    const float brighter = amplitude_of_db((float)(most_rouleaux_db * moves.rouleaux));
     const int32_t first = (int32_t)ceil(in->section[which][0].along_m / sonde_segment_m);
     const int32_t last = (int32_t)floor(in->section[which][sections - 1].along_m / sonde_segment_m);
     sonde_vessel_state low, high;
     bool known = sonde_vessel_at(in, which, first * sonde_segment_m, &low);
     for (int32_t k = first; k < last && known; ++k, low = high) {
       known = sonde_vessel_at(in, which, (k + 1) * sonde_segment_m, &high);
-      blood_segment one = {.flowed = flowed_m / sonde_segment_m,
+      blood_segment one = {.flowed = moves.path_m / sonde_segment_m,
+                           .streaks = most_streaks * moves.rouleaux,
                            .solid = sonde_echo_solid(echo, which, low.rest_centre_m.z),
                            .salt = (uint32_t)echo->seed + which,
                            .segment = k,
@@ -97,6 +109,7 @@ void sonde_echo_blood(sonde_echo *echo) {
       if (!known || !(one.solid < 1)) continue;
       one.count = (uint32_t)fmin(density * map_segment(echo, &low, &high, &one.map), SONDE_BLOOD);
       if (one.count == 0) continue;
+      one.map.m[0][3] *= brighter;
       // Streamlines that clot leaves.
       uint32_t flowing = 0;
       for (uint32_t i = 0; i < one.count && one.solid > 0; ++i)

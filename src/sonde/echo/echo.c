@@ -120,6 +120,7 @@ static size_t carve(sonde_echo *echo, char *block) {
   CARVE(echo->flat_envelope, image);
   CARVE(echo->grey, image);
   CARVE(echo->noise, SONDE_NOISE);
+  CARVE(echo->bundle, SONDE_BLOOD);
   const size_t side = SONDE_TILE_SIDE;
   for (int k = 0; k < SONDE_TILES; ++k) CARVE(echo->tile[k], side * side * side);
   CARVE(echo->cubes, 1);
@@ -230,6 +231,11 @@ sonde_echo_flow sonde_echo_flow_default(void) {
 void sonde_echo_set_flow(sonde_echo *echo, const sonde_echo_flow *flow) {
   SONDE_ASSERT(echo != NULL && flow != NULL);
   SONDE_ASSERT(isfinite(flow->t_s) && isfinite(flow->vein_m_s) && isfinite(flow->artery_m_s));
+  for (uint32_t v = 0; flow->blood && v < echo->interior->vessel_count; ++v) {
+    const sonde_vessel_blood *b = &flow->blood[v];
+    SONDE_ASSERT(isfinite(b->path_m) && isfinite(b->speed_m_s));
+    SONDE_ASSERT(b->rouleaux >= 0 && b->rouleaux <= 1 && b->shut >= 0 && b->shut <= 1);
+  }
   echo->flow = *flow;
 }
 

@@ -93,6 +93,7 @@ struct sonde_echo {
   scatter_pool pool;
   uint32_t *tile[SONDE_TILES]; // [TILE_SIDE^3] of fat and muscle (tiles.c)
   scatter_pool blood; // [BLOOD] streamlines: place in a lumen of unit width, speed over the mean
+  uint32_t *bundle;   // [BLOOD] of neighbouring streamlines
   float *noise;       // [NOISE]
 
   // Constants of a frame (frame_hot.c).

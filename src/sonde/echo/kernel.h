@@ -11,10 +11,8 @@
 
 enum {
   SONDE_MOST_LINES = 512,
-  ECHO_ALIGN = 16, // lines and batches are padded to whole vectors
-  // Skin, dermis, deep fascia, cortex, superficial fascia; the vessels' walls and the lesions
-  // follow.
-  LAYER_LEVELS = 5,
+  ECHO_ALIGN = 16,  // lines and batches are padded to whole vectors
+  LAYER_LEVELS = 5, // skin, dermis, deep fascia, cortex, superficial fascia; then walls, lesions
   TEXTURES = 15,    // one more than the last texture's salt
   KNOT_FLOATS = 11, // that a texture remembers per line
   MOST_LEVELS = LAYER_LEVELS + MOST_VESSELS + MOST_LESIONS,
@@ -116,23 +114,24 @@ typedef struct merge_job {
   uint32_t count;                         // pairs of columns, multiple of ECHO_ALIGN
 } merge_job;
 
-// Blood: places along one segment, in segments, and signs of the scatterers on some streamlines.
+// Blood on some streamlines: places along one segment, in segments, and amplitudes. Those of a
+// streak, a bundle of streamlines and one segment long, differ by their signs only.
 typedef struct stream_job {
-  const float *z, *speed; // [count] place at the start, speed over the mean
-  uint32_t count, first;  // number of the first streamline
-  double flowed;          // by the mean flow, in segments
+  const float *z, *speed;      // [count] place at the start, speed over the mean
+  const uint32_t *bundle;      // [count] of the streamline
+  uint32_t count, first, salt; // first: number of the first streamline
+  double flowed, streaks;      // mean flow, in segments; sizes are 1 +- streaks over their rms
   int32_t segment;
-  uint32_t salt;
-  float *at, *sign; // [count] place about the segment's middle; +-1
+  float *at, *sign; // [count] place about the segment's middle; amplitude
 } stream_job;
 
 // What a vessel in view is made of.
 typedef struct tissue_vessel {
   float wall_m, clot_fraction, clot_scatter;
-  float sheath_m;            // of bright fat around it; 0: none
-  float clot_loss;           // dB/m/MHz one way
+  float sheath_m, clot_loss; // of bright fat around it, 0: none; dB/m/MHz one way
   float lumps_db, layers_db; // unevenness of the clot
   uint32_t number;           // among the leg's vessels
+  float cusp_bend;           // how far the cusps of its valves are closed, 0 to 1
 } tissue_vessel;
 
 typedef enum tissue_lesion_kind { TISSUE_NODE, TISSUE_CYST, TISSUE_HAEMATOMA } tissue_lesion_kind;

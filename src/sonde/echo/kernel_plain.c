@@ -104,11 +104,18 @@ static void stream(const stream_job *job) {
   for (uint32_t i = 0; i < job->count; ++i) {
     double at = (double)job->z[i] + job->flowed * (double)job->speed[i], whole = floor(at);
     uint32_t train = (uint32_t)(job->segment - (int32_t)whole);
-    uint32_t h = train * 0x9e3779b1u ^ (job->first + i) * 0x85ebca77u ^ job->salt * 0xc2b2ae3du;
-    h = (h ^ (h >> 15)) * 0x2c1b3c6du;
-    h = (h ^ (h >> 12)) * 0x297a2d39u;
+    const uint32_t salt = job->salt * 0xc2b2ae3du;
+    uint32_t hash[2] = {train * 0x9e3779b1u ^ (job->first + i) * 0x85ebca77u ^ salt,
+                        train * 0x9e3779b1u ^ job->bundle[i] * 0xb5297a4du ^ salt};
+    for (int k = 0; k < 2; ++k) {
+      hash[k] = (hash[k] ^ (hash[k] >> 15)) * 0x2c1b3c6du;
+      hash[k] = (hash[k] ^ (hash[k] >> 12)) * 0x297a2d39u;
+      hash[k] ^= hash[k] >> 15;
+    }
+    const double streaks = job->streaks, share = (double)(hash[1] >> 8) * 0x1p-23 - 1;
+    const double size = (1 + streaks * share) / sqrt(1 + streaks * streaks / 3);
     job->at[i] = (float)(at - whole - 0.5);
-    job->sign[i] = (h ^ (h >> 15)) & 1 ? 1.0f : -1.0f;
+    job->sign[i] = (float)(hash[0] & 1 ? size : -size);
   }
 }
 

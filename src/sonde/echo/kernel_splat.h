@@ -166,23 +166,30 @@ static void splat(const splat_job *job) {
   lay_rest(job, &f);
 }
 
+INLINE uint32_t stream_hash(uint32_t h) {
+  h = (h ^ (h >> 15)) * 0x2c1b3c6du;
+  h = (h ^ (h >> 12)) * 0x297a2d39u;
+  return h ^ (h >> 15);
+}
+
 // Blood on its streamlines, which are apart from each other: the compiler makes vectors of this.
 static void stream(const stream_job *job) {
   const float *restrict z = job->z, *restrict speed = job->speed;
   float *restrict place = job->at, *restrict sign = job->sign;
   const double flowed = job->flowed;
   const uint32_t salt = job->salt * 0xc2b2ae3du, first = job->first;
+  const uint32_t *restrict bundle = job->bundle;
+  const float streaks = (float)job->streaks, even = 1 / __builtin_sqrtf(1 + streaks * streaks / 3);
   const int32_t segment = job->segment;
   SONDE_ASSERT(job->count <= 0x7fffffff);
   for (uint32_t i = 0; i < job->count; ++i) {
     double at = (double)z[i] + flowed * (double)speed[i], whole = __builtin_floor(at);
     uint32_t train = (uint32_t)(segment - (int32_t)whole);
-    uint32_t h = train * 0x9e3779b1u ^ (first + i) * 0x85ebca77u ^ salt;
-    h = (h ^ (h >> 15)) * 0x2c1b3c6du;
-    h = (h ^ (h >> 12)) * 0x297a2d39u;
-    h = (h ^ (h >> 15)) & 1;
+    uint32_t h = stream_hash(train * 0x9e3779b1u ^ (first + i) * 0x85ebca77u ^ salt);
+    uint32_t s = stream_hash(train * 0x9e3779b1u ^ bundle[i] * 0xb5297a4du ^ salt);
     place[i] = (float)(at - whole - 0.5);
-    sign[i] = (float)(2 * (int32_t)h - 1);
+    float size = even * (1 + streaks * ((float)(int32_t)(s >> 8) * 0x1p-23f - 1));
+    sign[i] = (float)(2 * (int32_t)(h & 1) - 1) * size;
   }
 }
 

@@ -44,16 +44,15 @@ INLINE floats clot_grain(const tissue_vessel *it, knots *memory, floats theta, f
   return it->lumps_db * lump + it->layers_db * (layer - 0.3f);
 }
 
-// Cusps of a valve in moving blood: two sheets, rooted in the wall, whose edges come half-way to
-// each other. `field`: place over the lumen's radius and the cusps' length, from the heart's far
-// end.
-static const float cusp_m = 0.22e-3f, cusp_scatter = 1.3f, cusp_bend = 0.5f;
+// Cusps of a valve: two sheets, rooted in the wall, whose edges come together by the share `bend`.
+// `field`: place over the lumen's radius and the cusps' length, from the heart's far end.
+static const float cusp_m = 0.22e-3f, cusp_scatter = 1.3f;
 
-INLINE floats cusps(const tissue_job *job, const tissue_body *it, uint32_t field) {
+INLINE floats cusps(const tissue_job *job, const tissue_body *it, uint32_t field, float bend) {
   const uint32_t n = job->lines;
   floats a = field_at(job, field), b = field_at(job, field + n), u = field_at(job, field + 2 * n);
   floats chord = vsqrt(vmax(1 - b * b, vset(0)));
-  floats away = vabs(vabs(a) - chord * (1 - cusp_bend * u)) * it->half_m[0];
+  floats away = vabs(vabs(a) - chord * (1 - bend * u)) * it->half_m[0];
   return vonly((u > 0) & (u < 1) & (a * a + b * b < 1),
                cusp_scatter * vmax(1 - away * (1 / cusp_m), vset(0)));
 }
@@ -83,9 +82,14 @@ INLINE void vessels(const tissue_job *job, const tissue_point *p, uint32_t line,
   for (uint32_t i = 0; i < gate->bodies; ++i) {
     const uint32_t k = gate->body[i];
     if (job->body[k].kind != SONDE_TISSUE_CUSPS) continue;
-    const floats bright = cusps(job, &job->body[k], body_place_at(job, p->map, k));
-    for (uint32_t j = 0; j < gate->vessels && vany(bright > 0); ++j)
-      mark((level[gate->vessel[j]] <= 0) & (bright > out[0]), bright, blood_tissue[1], out);
+    const uint32_t field = body_place_at(job, p->map, k);
+    for (uint32_t j = 0; j < gate->vessels; ++j) {
+      const uint32_t v = gate->vessel[j];
+      const ints lumen = level[v] <= 0;
+      if (!vany(lumen)) continue;
+      const floats bright = cusps(job, &job->body[k], field, job->vessel[v].cusp_bend);
+      mark(lumen & (bright > out[0]), bright, blood_tissue[1], out);
+    }
   }
   for (uint32_t i = 0; i < gate->vessels; ++i) {
     const uint32_t v = gate->vessel[i], at = line + vessel_field_at(v, VESSEL_SHORT) * n;

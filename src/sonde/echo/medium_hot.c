@@ -3,6 +3,7 @@
 // docs/echo.md.
 #include "base/base.h"
 #include "base/random.h"
+#include "echo/blood.h"
 #include "echo/gates.h"
 #include "echo/sound.h"
 #include "sonde/tissue_anatomy.h"
@@ -323,7 +324,8 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
         .clot_loss = 18 + 40 * age,
         .lumps_db = 1.5f + 4 * age,
         .layers_db = 2.5f + 5.5f * age,
-        .number = which};
+        .number = which,
+        .cusp_bend = (float)sonde_blood_of(echo, which).shut};
   }
   for (uint32_t k = 0; k < job->lesions; ++k) {
     const sonde_lesion *l = &in->findings.lesion[echo->lesion[k]];

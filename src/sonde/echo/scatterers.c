@@ -58,7 +58,9 @@ void sonde_scatterers_draw(sonde_echo *echo) {
   for (uint32_t i = 0; i + piece <= SONDE_LOOSE; i += piece)
     draw_share(pool, echo->seed + 5, SONDE_POOL, i, 2, piece / 16);
   // Streamlines evenly over a round section of unit width, so that the first n fill it for any n;
-  // speed over the mean is 2 (1 - (r/R)^2).
+  // speed over the mean is 2 (1 - (r/R)^2). Bundles are squares of half a millimetre in a vein
+  // of 7.
+  const double bundles = 12;
   for (uint32_t i = 0; i < SONDE_BLOOD; ++i) {
     uint64_t j = 3 * (uint64_t)i, seed = echo->seed + 6;
     double square = sonde_random_uniform(seed, j), r = 0.5 * sqrt(square);
@@ -66,6 +68,8 @@ void sonde_scatterers_draw(sonde_echo *echo) {
     blood->x[i] = (float)(r * cos(angle)), blood->y[i] = (float)(r * sin(angle));
     blood->z[i] = (float)sonde_random_uniform(seed, j + 2);
     blood->sign[i] = (float)(2 * (1 - square));
+    echo->bundle[i] = (uint32_t)(((double)blood->x[i] + 0.5) * bundles) << 8 |
+                      (uint32_t)(((double)blood->y[i] + 0.5) * bundles);
   }
   for (uint64_t i = 0; i < SONDE_NOISE; ++i)
     echo->noise[i] = (float)(sonde_random_normal(echo->seed + 1, i) * sqrt(0.5));

@@ -80,7 +80,7 @@ bool sonde_truth_at(const sonde_echo *echo, const sonde_image *image, uint32_t c
       pixel->label = SONDE_LABEL_THROMBUS;
       return true;
     }
-    const double speed = sonde_blood_speed(echo, number) * 2 * (1 - a * a - b * b);
+    const double speed = sonde_blood_of(echo, number).speed_m_s * 2 * (1 - a * a - b * b);
     pixel->velocity_m_s = v_scale(v.axis, solid < 1 ? speed : 0);
     return true;
   }
