@@ -294,15 +294,19 @@ static void print_solid(const summary *seen, bool json) {
   // Of passes and places, in processors.
   const double share = ((double)c->passes * c->pass_mean_s + c->build_s) / seen->wall_s;
   if (!json) {
-    printf("\nsolid: %llu passes of %.1f ms, %u late, %u places, %.2f of a processor",
-           (unsigned long long)c->passes, 1e3 * c->pass_mean_s, c->late, c->places, share);
+    printf("\nsolid: %llu passes of %.1f ms, %u late, %u places, %.2f of a processor; "
+           "%llu ticks in the skin without a place",
+           (unsigned long long)c->passes, 1e3 * c->pass_mean_s, c->late, c->places, share,
+           (unsigned long long)c->ticks_without_place);
     return;
   }
   app_json_object("solid");
   app_json("passes:%lu passes_late:%u pass_mean_ms:%g pass_max_ms:%g factors:%lu places:%u "
-           "places_refused:%u places_s:%g hand_over_max_n:%g core_share:%g images_per_s:%g",
+           "places_refused:%u ticks_without_place:%lu places_s:%g hand_over_max_n:%g core_share:%g "
+           "images_per_s:%g",
            c->passes, c->late, 1e3 * c->pass_mean_s, 1e3 * c->pass_most_s, c->factors, c->places,
-           c->refused, c->build_s, c->handed_over_n, share, (double)seen->images / seen->wall_s);
+           c->refused, c->ticks_without_place, c->build_s, c->handed_over_n, share,
+           (double)seen->images / seen->wall_s);
   app_json_close();
 }
 

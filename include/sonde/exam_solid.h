@@ -25,10 +25,12 @@ SONDE_API sonde_session_solid sonde_session_solid_default(void);
 
 /** How a session's solid kept up. */
 typedef struct sonde_session_solid_counts {
-  uint64_t passes, factors; /**< of the worker: states, and stiffnesses of the bulk */
-  uint32_t late;            /**< passes that were not done when they were due */
-  uint32_t places;          /**< solids that the probe has changed over to */
-  uint32_t refused;         /**< places where there was no skin below the probe, or no ring */
+  uint64_t passes, factors;     /**< of the worker: states, and stiffnesses of the bulk */
+  uint64_t ticks_without_place; /**< with the probe's face in the skin at rest, and no solid there
+                                     that bears all of it: the hand feels nothing, or too little */
+  uint32_t late;                /**< passes that were not done when they were due */
+  uint32_t places;              /**< solids that the probe has changed over to */
+  uint32_t refused;             /**< places where there was no skin below the probe, or no ring */
   double pass_mean_s, pass_most_s; /**< processor time */
   double build_s;                  /**< processor time of all places */
   double handed_over_n;            /**< largest change of the force where one took over */

@@ -152,6 +152,37 @@ static void a_slide_goes_from_place_to_place(void **state) {
   close_session(session);
 }
 
+// A probe that slides off the only place there is loses its force, but in no tick by a jerk.
+static void a_probe_that_leaves_its_place_feels_no_jerk(void **state) {
+  const key keys[] = {{0, -2e-3, 0}, {0.2, 8e-3, 0}, {0.3, 8e-3, 0}, {1.3, 8e-3, 40e-3}};
+  sonde_session *session = open_solid(*state, keys, 4, coarse_m, NULL);
+  sonde_vec3 last = vec3(0, 0, 0);
+  double most_n = 0, largest_n = 0;
+  for (int t = 0; t < 1300; ++t) {
+    const sonde_vec3 *felt_n = &session->subject->felt.force_n;
+    sonde_session_step(session);
+    sonde_solid_leg_await(session->subject->solid, SONDE_LEG_PASS | (t < 100) * SONDE_LEG_PLACE);
+    (void)sonde_session_show(session);
+    most_n = fmax(most_n, v_distance(*felt_n, last)), largest_n = fmax(largest_n, v_norm(last));
+    last = *felt_n;
+  }
+  assert_true(largest_n > 1 && v_norm(last) < 0.05 && most_n < 0.3);
+  assert_int_equal(sonde_session_solid_count(session).places, 1);
+  assert_true(sonde_session_solid_count(session).ticks_without_place > 300);
+  close_session(session);
+}
+
+// Pressed in from the first tick on: the first place is asked for then, made, walked to the probe
+// and serves 40 ticks later.
+static void ticks_in_the_skin_without_a_place_are_counted(void **state) {
+  const key keys[] = {{0, 4e-3, 0}, {0.1, 4e-3, 0}};
+  sonde_session *session = open_solid(*state, keys, 2, coarse_m, NULL);
+  (void)run(session, 100);
+  assert_int_equal(sonde_session_solid_count(session).ticks_without_place, 40);
+  assert_true(session->subject->felt.area_m2 > 0);
+  close_session(session);
+}
+
 static void forget(const char *path) {
   char keys[64];
   snprintf(keys, sizeof keys, "%s.keys", path);
@@ -294,6 +325,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(force_and_vein_are_those_of_one_solid),
       cmocka_unit_test(a_slide_goes_from_place_to_place),
+      cmocka_unit_test(a_probe_that_leaves_its_place_feels_no_jerk),
+      cmocka_unit_test(ticks_in_the_skin_without_a_place_are_counted),
       cmocka_unit_test(a_seek_has_the_bits_of_playing_through),
       cmocka_unit_test(a_session_in_real_time_replays),
       cmocka_unit_test(ticks_do_not_allocate),

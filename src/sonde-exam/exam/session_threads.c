@@ -33,7 +33,7 @@ static void *tend(sonde_session *session, bool (*work)(sonde_solid_leg *), doubl
 
 static void *pass_main(void *session) { return tend(session, sonde_solid_leg_work, 0.5e-3); }
 
-static void *place_main(void *session) { return tend(session, sonde_solid_leg_build, 10e-3); }
+static void *place_main(void *session) { return tend(session, sonde_solid_leg_build, 2e-3); }
 
 static sonde_status launch(pthread_t *thread, void *(*body)(void *), sonde_session *session,
                            bool *running, sonde_error *error) {
@@ -104,6 +104,7 @@ sonde_session_solid_counts sonde_session_solid_count(const sonde_session *sessio
   const sonde_leg_counts c = sonde_solid_leg_count(session->subject->solid);
   return (sonde_session_solid_counts){.passes = c.passes,
                                       .factors = c.factors,
+                                      .ticks_without_place = c.without_place,
                                       .late = c.late,
                                       .places = c.places,
                                       .refused = c.refused,

@@ -57,6 +57,10 @@ static void retire(sonde_solid_leg *leg, sonde_leg_place *place, bool all) {
       continue;
     }
     *at = one->next;
+    for (int k = 0; k < 2 && one->live && leg->spares < SONDE_LEG_SPARES; ++k) {
+      leg->spare[leg->spares++] = one->live->bulk[k];
+      one->live->bulk[k] = (sonde_numeric){0};
+    }
     destroy_place(one);
   }
 }
@@ -66,6 +70,7 @@ void sonde_solid_leg_destroy(sonde_solid_leg *leg) {
   retire(leg, leg->coming, false);
   retire(leg, leg->given_back, false);
   retire(leg, atomic_load(&leg->current), true);
+  for (uint32_t k = 0; k < leg->spares; ++k) sonde_numeric_clear(&leg->spare[k]);
   sonde_free(leg);
 }
 
@@ -95,7 +100,7 @@ static sonde_status find_skin(const sonde_solid_leg *leg, sonde_leg_place *place
 }
 
 // A place at rest where the probe's axis meets the skin.
-static sonde_status make_place(const sonde_solid_leg *leg, sonde_pose pose, uint32_t probe,
+static sonde_status make_place(sonde_solid_leg *leg, sonde_pose pose, uint32_t probe,
                                sonde_leg_place **out, sonde_error *error) {
   const sonde_probe *body = &leg->def.probes[probe];
   const sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
@@ -119,9 +124,12 @@ static sonde_status make_place(const sonde_solid_leg *leg, sonde_pose pose, uint
   if (!status && place->mesh.node_count > SONDE_LEG_NODES_MOST)
     status = sonde_fail(error, SONDE_ARGUMENT, "a ring of %u nodes, expected at most %d",
                         place->mesh.node_count, SONDE_LEG_NODES_MOST);
-  if (!status)
-    status = sonde_solid_live_create(&place->mesh, body, place->start, &leg->def.live, &place->live,
-                                     error);
+  if (!status) {
+    sonde_numeric *spare = leg->spares >= 2 ? &leg->spare[leg->spares -= 2] : NULL;
+    status = sonde_live_make(&place->mesh, body, place->start, &leg->def.live, spare, &place->live,
+                             error);
+    for (int k = 0; k < 2 && spare; ++k) sonde_numeric_clear(&spare[k]); // not taken
+  }
   if (!status) status = sonde_equilibrium_tissue(place->live->e, &place->tissue, error);
   if (!status) status = find_skin(leg, place, error);
   if (status)
@@ -164,7 +172,20 @@ bool sonde_solid_leg_build(sonde_solid_leg *leg) {
   else
     sonde_live_walk(leg->coming->live, leg->wanted_pose);
   leg->builds.build_s += sonde_clock_cpu() - before_s;
+  // Behind the first place: memory for the next one's factors, touched before it is wanted.
+  const sonde_leg_place *made = atomic_load(&leg->current) == NULL ? leg->coming : NULL;
   atomic_store_explicit(&leg->built, wanted, memory_order_release);
+  for (; made && leg->spares < 2; ++leg->spares) {
+    sonde_numeric *spare = &leg->spare[leg->spares];
+    spare->single = true;
+    if (sonde_numeric_reserve(spare, made->live->e->symbolic, NULL)) {
+      sonde_numeric_clear(spare);
+      break;
+    }
+    memset(spare->factor, 0, spare->factor_room * sizeof *spare->factor);
+    memset(spare->front, 0, spare->front_room * sizeof(float));
+    memset(spare->stack, 0, spare->stack_room * sizeof(float));
+  }
   return true;
 }
 

@@ -85,6 +85,7 @@ SONDE_LINK void sonde_leg_place_give_back(sonde_leg_place *place); // @thread im
 
 typedef struct sonde_leg_counts {
   uint64_t ticks, passes, factors;
+  uint64_t without_place;        // ticks in the skin at rest where no place bears the probe
   uint32_t late;                 // passes that were not done when they were due
   uint32_t places, refused;      // handed over; asked for where no ring can be
   double pass_s, pass_most_s;    // processor time of the passes, and of the longest

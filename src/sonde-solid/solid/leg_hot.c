@@ -7,13 +7,14 @@
 #include <string.h>
 
 enum { WALKS_MOST = 4 };
-static const double near_m = 1.5e-3;   // of the probe, where a place is handed over
+static const double near_m = 2.5e-3;   // of the probe, where a place is handed over
 static const double again_m = 3e-3;    // away from where there was no place
 static const double drift_ticks = 100; // in which the drift follows the probe
-static const double ahead_s = 0.4;     // in which a place is made
+static const double ahead_s = 0.2;     // in which a place is made
+static const double walk_s = 0.08;     // in which it is walked to the probe
 static const double farthest_m = 8e-3; // ahead of the probe
 static const double still_m_s = 4e-3;
-static const double passing_m_s = 80e-3; // a probe that is faster in the air passes by
+static const double passing_m_s = 80e-3; // a probe that is faster aside in the air passes by
 
 static void want(sonde_solid_leg *leg, sonde_leg_step step, sonde_pose pose, uint32_t probe) {
   leg->step = step, leg->wanted_pose = pose, leg->wanted_probe = probe;
@@ -31,10 +32,13 @@ static void take_step(sonde_solid_leg *leg, sonde_pose pose) {
     return;
   }
   const bool far =
-      leg->step == SONDE_LEG_MAKE || sonde_equilibrium_way(leg->wanted_pose, pose) > near_m;
+      leg->step == SONDE_LEG_MAKE || sonde_equilibrium_way(place->live->e->pose, pose) > near_m;
   if (far && leg->walks < WALKS_MOST) {
+    const double speed = fmax(v_norm(now->drift_m_s), 1e-3);
     ++leg->walks;
-    want(leg, SONDE_LEG_WALK, pose, place->probe);
+    sonde_pose to = pose;
+    to.position = v_madd(pose.position, fmin(walk_s, near_m / speed), now->drift_m_s);
+    want(leg, SONDE_LEG_WALK, to, place->probe);
     return;
   }
   // The hand goes on from what it felt.
@@ -58,7 +62,9 @@ static bool strays(const sonde_solid_leg *leg, const sonde_leg_place *place, uin
   const double speed = v_norm(now->drift_m_s), ahead = fmin(ahead_s * speed, farthest_m);
   *at = pose;
   if (speed > 0) at->position = v_madd(pose.position, ahead / speed, now->drift_m_s);
-  if (!(place != NULL && place->live->touches) && speed > passing_m_s) return false;
+  const sonde_vec3 axis = q_rotate(pose.rotation, vec3(0, 0, 1));
+  const double aside = v_norm(v_cross(axis, now->drift_m_s));
+  if (!(place != NULL && place->live->touches) && aside > passing_m_s) return false;
   if (now->is_refused && now->refused_probe == probe &&
       sonde_equilibrium_way(now->refused, pose) < again_m)
     return false;
@@ -102,6 +108,13 @@ uint32_t sonde_solid_leg_tick(sonde_solid_leg *leg, uint32_t probe, sonde_pose p
     }
   }
   *contact = (sonde_solid_contact){0};
+  // Skin that may touch surrounds the footprint by so much: beyond it the face is not borne.
+  const sonde_vec3 from =
+      place ? pose_apply_inverse(place->start, pose.position) : vec3(INFINITY, 0, 0);
+  const double zone_m = leg->def.live.solid.zone_m;
+  const bool borne =
+      place && place->probe == probe && fabs(from.x) < zone_m && fabs(from.y) < zone_m;
+  leg->counts.without_place += !borne && sonde_surface_inside(leg->def.skin, pose.position);
   if (place == NULL) return did;
   const bool done = sonde_live_is_done(place->live);
   if (due && done && told & (SONDE_LEG_PASS | SONDE_LEG_AS_DONE)) did |= SONDE_LEG_PASS;

@@ -20,6 +20,8 @@ struct sonde_leg_place {
   sonde_leg_place *next;       // of those that no longer serve
 };
 
+enum { SONDE_LEG_SPARES = 4 }; // of two places
+
 typedef enum sonde_leg_step { SONDE_LEG_IDLE, SONDE_LEG_MAKE, SONDE_LEG_WALK } sonde_leg_step;
 
 struct sonde_solid_leg {
@@ -41,6 +43,9 @@ struct sonde_solid_leg {
   // Worker's and builder's.
   sonde_leg_counts passes, builds;
   sonde_leg_place *retired;
+  // Factors of places that were freed: memory that is new is dearer than a factor.
+  sonde_numeric spare[SONDE_LEG_SPARES];
+  uint32_t spares;
 };
 
 #endif

@@ -51,7 +51,8 @@ static void arrange(sonde_solid_live *l) {
   for (uint32_t k = 0; k < e->zone_count; ++k) l->skin[k] = e->mesh->node[e->zone_node[k]];
 }
 
-static sonde_status reserve(sonde_solid_live *l, sonde_error *error) {
+// @param spare factors whose memory is taken; NULL: none
+static sonde_status reserve(sonde_solid_live *l, sonde_numeric *spare, sonde_error *error) {
   const sonde_equilibrium *e = l->e;
   const size_t side = sonde_live_side(l), zone = 3 * (size_t)e->zone_count;
   l->point_count = e->zone_faces * SONDE_TOUCH_POINTS;
@@ -89,8 +90,10 @@ static sonde_status reserve(sonde_solid_live *l, sonde_error *error) {
     if (!(*parts[k].array = sonde_calloc(parts[k].count, parts[k].size)))
       return sonde_fail_memory(error);
   sonde_status status = SONDE_OK;
-  for (int k = 0; k < 2 && !status; ++k)
+  for (int k = 0; k < 2 && !status; ++k) {
+    if (spare) l->bulk[k] = spare[k], spare[k] = (sonde_numeric){0};
     l->bulk[k].single = true, status = sonde_numeric_reserve(&l->bulk[k], e->symbolic, error);
+  }
   l->e->numeric.kernels = l->bulk[0].kernels; // its only part that a live solid uses
   return status;
 }
@@ -111,6 +114,12 @@ static bool begin_at_rest(sonde_solid_live *l, sonde_pose pose, sonde_live_tange
 sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe *probe,
                                      sonde_pose start, const sonde_solid_live_def *def,
                                      sonde_solid_live **live, sonde_error *error) {
+  return sonde_live_make(mesh, probe, start, def, NULL, live, error);
+}
+
+sonde_status sonde_live_make(const sonde_hexes *mesh, const sonde_probe *probe, sonde_pose start,
+                             const sonde_solid_live_def *def, sonde_numeric *spare,
+                             sonde_solid_live **live, sonde_error *error) {
   SONDE_ASSERT(mesh != NULL && probe != NULL && def != NULL && live != NULL);
   *live = NULL;
   sonde_status status = sonde_def_check("a live solid", def->version, error);
@@ -130,7 +139,7 @@ sonde_status sonde_solid_live_create(const sonde_hexes *mesh, const sonde_probe 
   if (!l) return sonde_fail_memory(error);
   l->def = *def;
   status = sonde_equilibrium_place(mesh, probe, start, &def->solid, def->skin_m, &l->e, error);
-  if (!status) status = reserve(l, error);
+  if (!status) status = reserve(l, spare, error);
   if (!status) {
     l->before = l->asked_pose = l->felt_pose = start;
     arrange(l);
@@ -288,12 +297,17 @@ bool sonde_live_rest(sonde_solid_live *l, const sonde_pose asked[2]) {
 void sonde_live_walk(sonde_solid_live *l, sonde_pose pose) {
   enum { PASSES_MOST = 60, SETTLING = 4 };
   SONDE_ASSERT(l != NULL && sonde_live_is_done(l));
+  // A factor costs as much as five passes: it is made at once, and where the next step needs it.
+  const sonde_solid_live_def def = l->def;
+  const uint64_t slice = l->slice;
+  l->def.refresh_m = fmax(def.refresh_m, 0.75 * def.lag_m), l->slice = UINT64_MAX;
   l->before = l->asked_before = l->asked_pose = pose;
   for (int n = 0, there = 0; n < PASSES_MOST && there < SETTLING && !(n > 0 && l->rests); ++n) {
     atomic_fetch_add(&l->asked, 1);
     (void)sonde_solid_live_work(l);
     there += sonde_equilibrium_way(l->e->pose, pose) < sonde_live_still_m;
   }
+  l->def = def, l->slice = slice;
   l->serving = atomic_load(&l->asked) & 1;
   // The tick's contact begins where the skin is: of skin at rest deep inside the probe, what is
   // nearest are the probe's sides.

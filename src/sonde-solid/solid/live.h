@@ -93,6 +93,11 @@ static inline size_t sonde_live_side(const sonde_solid_live *l) { // of patch an
   return 3 * (size_t)(l->e->patch_count + l->e->zone_count);
 }
 
+// As sonde_solid_live_create(), with the memory of two factors that another live solid has left,
+// which is taken; NULL: none.
+sonde_status sonde_live_make(const sonde_hexes *mesh, const sonde_probe *probe, sonde_pose start,
+                             const sonde_solid_live_def *def, sonde_numeric *spare,
+                             sonde_solid_live **live, sonde_error *error);
 // Whether the pass that was asked for is done. @thread tick
 static inline bool sonde_live_is_done(const sonde_solid_live *l) {
   return atomic_load_explicit(&l->done, memory_order_acquire) ==

@@ -131,14 +131,13 @@ static void ease(sonde_solid_live *l, sonde_pose pose, bool touches, sonde_solid
   const double size = v_norm(l->easing_n), most = 1e-3 * l->def.ease_n_s;
   const double left = fmin(size - most - 1e-3 * size / easing_s, v_norm(contact->force_n));
   const double share = left > 0 ? left / size : 0;
-  sonde_vec3 force = v_madd(contact->force_n, share, l->easing_n);
-  sonde_vec3 torque = v_madd(contact->torque_nm, share, l->easing_nm);
+  // A probe that touches nothing has nothing left to ease.
+  sonde_vec3 force = v_madd(contact->force_n, touches ? share : 0, l->easing_n);
+  sonde_vec3 torque = v_madd(contact->torque_nm, touches ? share : 0, l->easing_nm);
   const double way = sonde_equilibrium_way(l->felt_pose, pose);
   const double change = v_distance(force, l->felt_n);
   const double limit = most + l->shown[l->serving].stiffness_n_m * way;
-  if (!touches) {
-    force = torque = vec3(0, 0, 0);
-  } else if (change > limit) {
+  if (change > limit) {
     force = v_madd(l->felt_n, limit / change, v_sub(force, l->felt_n));
     torque = v_madd(l->felt_nm, limit / change, v_sub(torque, l->felt_nm));
   }
