@@ -93,6 +93,7 @@ static size_t make_frame(unsigned char *bytes, size_t capacity, bool colour) {
   s->penetration_m = 0.022;
   s->vein_area_ratio = (double)NAN;
   s->solver_iterations = 1000000;
+  s->solid = true, s->flags = SONDE_FLAG_INSIDE_OUT;
   return page_encode_frame(&frame, &rest, 9, bytes, capacity);
 }
 
@@ -168,12 +169,12 @@ static void frame_fields_stand_where_the_protocol_says(void **state) {
   unsigned char b[160] = {0};
   assert_int_equal(small_frame(b, sizeof b), 140 + 12 + 2);
   static const unsigned char HEAD[48] = {
-      'S', 'N', 'D', 'E', 3,   0, 3,    0,
-      9,   0,   0,   0,   154, 0, 0,    0, // header
-      8,   7,   6,   5,   4,   3, 2,    1,
-      0,   0,   0,   0,   0,   0, 0xf8, 0x3f, // tick, 1.5 s
-      2,   0,   0,   0,   2,   0, 1,    0,
-      3,   0,   4,   0,   0,   0, 0xff, 0xff}; // nodes ... iterations (full)
+      'S', 'N', 'D', 'E', 3,   0,    3,    0,
+      9,   0,   0,   0,   154, 0,    0,    0, // header
+      8,   7,   6,   5,   4,   3,    2,    1,
+      0,   0,   0,   0,   0,   0,    0xf8, 0x3f, // tick, 1.5 s
+      2,   0,   0,   0,   2,   0,    1,    0,
+      3,   0,   4,   0,   8,   0x80, 0xff, 0xff}; // nodes ... flags, iterations (full)
   assert_memory_equal(b, HEAD, sizeof HEAD);
   assert_float_equal(f32_at(b + 52), 100, 1e-4);    // x mm
   assert_float_equal(f32_at(b + 64), 1, 0);         // w

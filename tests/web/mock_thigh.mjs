@@ -101,6 +101,7 @@ export class SyntheticThigh {
     this.pose = { position_mm: [6, RADIUS(140) + 12, 140], rotation: [0.7071, 0.7071, 0, 0] };
     this.goal = this.pose;
     this.fault = 0;
+    this.solid = true;
     this.sequence = 0;
     this.time_s = 0;
     this.noise = Uint8Array.from({ length: 65521 }, (_, i) => ((i * 7919) ^ (i * i * 31)) & 255);
@@ -187,7 +188,7 @@ export class SyntheticThigh {
     b.writeDoubleLE(this.time_s, 24);
     b.writeUInt32LE(nodes, 32);
     const probe = Math.max(0, PROBES.findIndex((p) => p.name === this.controls.probe));
-    [w, h, probe, this.fault, 0, 4].forEach((v, i) => b.writeUInt16LE(v, 36 + 2 * i));
+    [w, h, probe, this.fault, this.solid ? 0x8000 : 0, 4].forEach((v, i) => b.writeUInt16LE(v, 36 + 2 * i));
     b.writeUInt32LE(nodes, 48);
     const force = s.axis.map((v) => -v * s.force);
     const seen = (v) => (s.seen ? v : NaN);

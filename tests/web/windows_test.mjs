@@ -170,6 +170,7 @@ async function testOffline(browser, mock) {
     await page.goto(`${mock.address}?site=27&depth=10&quality=low`);
     await ready(page);
     await page.waitForFunction(() => Number.parseFloat(document.getElementById("force-value").textContent) > 1);
+    await page.waitForFunction(() => document.getElementById("status-text").textContent === "Connected, solid tissue");
     mock.drop();
     await page.waitForFunction(() => !window.sonde.connected);
     await picture(page, path.join(outDir, `offline_${size.join("x")}.png`));

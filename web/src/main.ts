@@ -20,7 +20,7 @@ import { fillHelp, Readouts, Sliders } from "./panel";
 import { ForcePlot } from "./plot";
 import { Hold, nearestSite } from "./pose";
 import { PatientTools } from "./practice";
-import { FLAG_INSIDE_OUT, VERSIONS, type Controls, type Exam, type Frame, type Hello, type Phase, type Replay, type Snapshot, type TextMessage } from "./protocol";
+import { FLAG_INSIDE_OUT, FLAG_SOLID, VERSIONS, type Controls, type Exam, type Frame, type Hello, type Phase, type Replay, type Snapshot, type TextMessage } from "./protocol";
 import { Rates } from "./rates";
 import { ReplayBar } from "./replay";
 import { ResultDialog } from "./result";
@@ -639,7 +639,7 @@ class App {
     if (!this.imaged && this.frames > 0) (this.imaged = true), this.wake(); // for the leg
     if (this.input.holds) this.wake();
     this.nameTarget();
-    this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms);
+    this.rates.update(now_s, frame !== null, this.snapshot?.tick ?? 0, this.connected, this.connection.latency_ms, ((this.snapshot?.flags ?? 0) & FLAG_SOLID) !== 0);
   }
 
   private show(frame: Frame): void {

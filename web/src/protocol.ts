@@ -379,6 +379,8 @@ export interface Line {
 
 /** Bit of Snapshot.flags: the probe was led through the leg and is taken off until it has left it. */
 export const FLAG_INSIDE_OUT = 8;
+/** The hyperelastic solid bears the probe, else springs. */
+export const FLAG_SOLID = 0x8000;
 
 export interface Snapshot {
   tick: number;

@@ -1,4 +1,4 @@
-// Latency and frame rate, shown on request.
+// Which tissue bears the probe; latency and frame rate, shown on request.
 
 import { find, recall, remember } from "./dom";
 import { t } from "./words/language";
@@ -15,7 +15,7 @@ export class Rates {
   }
 
   /** Once per animation frame; writes once per second. */
-  update(now_s: number, drew: boolean, tick: number, connected: boolean, latency_ms: number): void {
+  update(now_s: number, drew: boolean, tick: number, connected: boolean, latency_ms: number, solid: boolean): void {
     if (drew) ++this.frames;
     const dt_s = now_s - this.at.s;
     if (dt_s < 1) return;
@@ -25,7 +25,9 @@ export class Rates {
     this.at = { s: now_s, tick, frames: this.frames };
     const seen = { images: images.toFixed(0), steps: steps.toFixed(0) };
     const rates = fresh ? t("rates.measuring") : Number.isNaN(latency_ms) ? t("rates.rates", seen) : t("rates.latency", { ...seen, ms: latency_ms.toFixed(0) });
-    find("status-text").textContent = !connected ? t("rates.not_connected") : this.shown ? rates : t("rates.connected");
+    const said = this.shown ? rates : t("rates.connected");
+    const tissue = solid ? t("rates.solid", { said }) : this.shown ? t("rates.springs", { said }) : said;
+    find("status-text").textContent = connected ? tissue : t("rates.not_connected");
     find("status").setAttribute("aria-pressed", String(this.shown));
   }
 }

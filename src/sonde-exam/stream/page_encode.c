@@ -118,7 +118,8 @@ size_t page_encode_frame(const sonde_frame *frame, const sonde_mesh *rest, uint3
   bytes_u16(&out, (uint16_t)frame->height);
   bytes_u16(&out, (uint16_t)s->probe);
   bytes_u16(&out, (uint16_t)s->fault);
-  bytes_u16(&out, (uint16_t)(s->flags & 0xffff));
+  SONDE_ASSERT(s->flags < PAGE_SOLID);
+  bytes_u16(&out, (uint16_t)(s->flags | (s->solid ? PAGE_SOLID : 0)));
   bytes_u16(&out, (uint16_t)(s->solver_iterations > 0xffff ? 0xffff : s->solver_iterations));
   bytes_u32(&out, s->awake_nodes);
   put_point_mm(&out, s->world_from_probe.position);

@@ -19,6 +19,7 @@ enum {
   PAGE_SPECTRUM_FIXED_BYTES = 56, // before the columns of a frame's spectrum
   PAGE_SPECTRUM = 3,              // what it begins with, where colours have a sonde_duplex_shown
   PAGE_FAN = 4,                   // likewise
+  PAGE_SOLID = 1 << 15,           // of a frame's flags: the hyperelastic solid bears the probe
   PAGE_COMMAND_BYTES = 12288,     // longest message accepted of a teacher: a case that is edited
   PAGE_SHORT_BYTES = 4096,        // longest one of every other kind, or of anyone else
   PAGE_COMMAND_DEPTH = 3,         // deepest nesting accepted

@@ -307,6 +307,8 @@ export const de: Words = {
   "rates.latency": "{images} Bilder/s, {steps} Schritte/s, {ms} ms",
   "rates.not_connected": "Nicht verbunden",
   "rates.connected": "Verbunden",
+  "rates.solid": "{said}, Volumenmodell",
+  "rates.springs": "{said}, Federn",
 
   "tissue.stiffness": "Steifigkeit",
   "tissue.damping": "Dämpfung",

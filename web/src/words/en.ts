@@ -306,6 +306,8 @@ export const en = {
   "rates.latency": "{images} images/s, {steps} steps/s, {ms} ms",
   "rates.not_connected": "Not connected",
   "rates.connected": "Connected",
+  "rates.solid": "{said}, solid tissue",
+  "rates.springs": "{said}, springs",
 
   "tissue.stiffness": "Stiffness",
   "tissue.damping": "Damping",

@@ -307,6 +307,8 @@ export const fr: Words = {
   "rates.latency": "{images} images/s, {steps} pas/s, {ms} ms",
   "rates.not_connected": "Non connecté",
   "rates.connected": "Connecté",
+  "rates.solid": "{said}, tissu solide",
+  "rates.springs": "{said}, ressorts",
 
   "tissue.stiffness": "Rigidité",
   "tissue.damping": "Amortissement",
