@@ -74,8 +74,8 @@ static const app_option TABLE[] = {
         "radius of a curved face, whose arc, the array's width over this radius, spans at most "
         "100 degrees; default flat"),
     OPT_TEXT(pathology, "case", "NAME",
-             "state of the vein: healthy, partial_mural, acute_occlusive, subacute_occlusive or "
-             "chronic_occlusive"),
+             "state of the vein: healthy, partial_mural, free_floating, acute_occlusive, "
+             "subacute_occlusive, chronic_occlusive or recanalised"),
     OPT_CALL(read_clot, "clot", "BRANCH:CASE",
              "the same for a branch of the model, such as great_saphenous"),
     OPT_CALL(read_lesion, "lesion", "KIND:X:DEPTH:WIDTH:HEIGHT",

@@ -49,7 +49,8 @@ static const app_option TABLE[] = {
     OPT_TEXT(probe, "probe", "NAME|FILE",
              "point, linear, square, sphere, or a mesh file in millimetres"),
     OPT_TEXT(pathology, "case", "NAME",
-             "healthy, partial_mural, acute_occlusive, subacute_occlusive or chronic_occlusive"),
+             "healthy, partial_mural, free_floating, acute_occlusive, subacute_occlusive, "
+             "chronic_occlusive or recanalised"),
     OPT_TEXT(preset, "preset", "FILE", "damping, stiffness and friction, see sonde-identify(1)"),
     OPT_TEXT(compare, "compare", "FILE",
              "a second preset, which the controls of the page can change over to"),

@@ -33,6 +33,13 @@ typedef enum sonde_label {
   SONDE_LABEL_COUNT
 } sonde_label;
 
+/** Where in a vein's lumen a clot that does not fill it lies. */
+typedef enum sonde_clot_form {
+  SONDE_CLOT_MURAL,      /**< on the far wall, with a free surface */
+  SONDE_CLOT_FLOATING,   /**< in the middle, blood all around it */
+  SONDE_CLOT_RECANALISED /**< all around two channels, which wind */
+} sonde_clot_form;
+
 /** State of the vein that a case prescribes. */
 typedef struct sonde_pathology {
   char name[32];
@@ -48,10 +55,12 @@ typedef struct sonde_pathology {
   /** How firmly the sheath around the vessels ties their walls to the muscle: 0 loose, as in a leg,
    * to 1 glued, as in the finite-element study (docs/interior_theory.md). */
   double sheath;
+  sonde_clot_form form;
+  uint32_t unused; /**< 0: states are compared byte by byte */
 } sonde_pathology;
 
-/** Preset names, NULL-terminated: healthy, partial_mural, acute_occlusive, subacute_occlusive,
- *  chronic_occlusive. @thread any */
+/** Preset names, NULL-terminated: healthy, partial_mural, free_floating, acute_occlusive,
+ *  subacute_occlusive, chronic_occlusive, recanalised. @thread any */
 SONDE_API const char *const *sonde_pathology_names(void);
 /** Preset by name; '-' and ' ' count as '_', and unique first words (e.g. "chronic") are accepted.
  *  @return SONDE_NOT_FOUND listing the known names @thread any */

@@ -1,6 +1,7 @@
 // What blood and clots look like: clutter in every lumen, fresh clot like blood, old clot brighter,
-// the free surface of a mural clot.
+// the free surface of a mural clot, floating and recanalised ones.
 #include "echo/bench.h"
+#include "echo/truth.h"
 #include "interior/clot.h"
 
 #include <stdlib.h>
@@ -180,10 +181,84 @@ static void a_mural_clot_is_no_chord(void **state) {
   }
 }
 
+// A floating and a recanalised clot hold their share of every section, and blood reaches the wall
+// all around the one and none of it in the other.
+static void clots_hold_their_share(void **state) {
+  (void)state;
+  for (int form = SONDE_CLOT_FLOATING; form <= SONDE_CLOT_RECANALISED; ++form)
+    for (double solid = 0.55; solid < 0.9; solid += 0.15) {
+      double worst = 0, wandered = 0;
+      for (double s = 0; s < 0.1; s += 5e-3) {
+        const int side = 160;
+        double inside = 0, clot = 0;
+        for (int k = 0; k < side * side; ++k) {
+          const double a = (k % side + 0.5) / side * 2 - 1, b = (k / side + 0.5) / side * 2 - 1;
+          if (a * a + b * b >= 1) continue;
+          const bool here = sonde_clot_depth((sonde_clot_form)form, solid, 1, s, a, b) > 0;
+          inside += 1, clot += here;
+          wandered += here != (sonde_clot_depth((sonde_clot_form)form, solid, 1, 0, a, b) > 0);
+          if (a * a + b * b > 0.995) assert_int_equal(here, form == SONDE_CLOT_RECANALISED);
+        }
+        worst = fmax(worst, fabs(clot / inside - solid));
+      }
+      print_message("form %d, share %.2f: off by %.3f\n", form, solid, worst);
+      assert_true(worst < 0.01 && wandered > 1000);
+    }
+}
+
+// The label of a pixel in the vein's lumen, thrombus or blood, else none.
+static sonde_label lumen_label(const bench *b, uint32_t column, uint32_t row) {
+  sonde_truth_pixel p;
+  if (!sonde_truth_at(b->echo, &b->image, column, row, &p) || p.vessel != 1)
+    return SONDE_LABEL_COUNT;
+  return p.label == SONDE_LABEL_THROMBUS || p.label == SONDE_LABEL_VEIN ? p.label
+                                                                        : SONDE_LABEL_COUNT;
+}
+
+// In the picture the blood of the channels and around the floating clot is darker than the clot,
+// where the labels have them. Pixels beside the wall are left out.
+static void pictures_show_their_forms(void **state) {
+  (void)state;
+  static const char *const STATES[] = {"free_floating", "recanalised"};
+  bench b;
+  bench_create(&b, leg_radius, 0.014, 0.012, false, true);
+  b.settings.depth_m = 0.05;
+  for (int s = 0; s < 2; ++s) {
+    double sum[2] = {0}, count[2] = {0}, all[2] = {0};
+    for (int round = 0; round < 6; ++round) {
+      view(&b, 5 * round, STATES[s]);
+      b.pathology.echogenicity = 0.9; // brighter than blood, whatever this case draws
+      look(&b, NULL);
+      const uint32_t beside = 9;
+      for (uint32_t row = beside; row + beside < b.image.height; row += 2)
+        for (uint32_t column = beside; column + beside < b.image.width; column += 2) {
+          const sonde_label label = lumen_label(&b, column, row);
+          if (label == SONDE_LABEL_COUNT) continue;
+          const bool clot = label == SONDE_LABEL_THROMBUS;
+          ++all[clot];
+          if (lumen_label(&b, column - beside, row) == SONDE_LABEL_COUNT ||
+              lumen_label(&b, column + beside, row) == SONDE_LABEL_COUNT ||
+              lumen_label(&b, column, row - beside) == SONDE_LABEL_COUNT ||
+              lumen_label(&b, column, row + beside) == SONDE_LABEL_COUNT)
+            continue;
+          sum[clot] += b.image.pixels[row * b.image.width + column], ++count[clot];
+        }
+    }
+    const double share = all[1] / (all[0] + all[1]);
+    print_message("%s: clot %.1f, blood %.1f; %.2f of the lumen\n", STATES[s], sum[1] / count[1],
+                  sum[0] / count[0], share);
+    assert_true(sum[1] / count[1] > sum[0] / count[0] + 10);
+    assert_true(fabs(share - b.pathology.thrombus_fraction) < 0.03);
+  }
+  bench_clear(&b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(fresh_clot_looks_like_blood),
                                      cmocka_unit_test(brightness_does_not_tell_the_age),
                                      cmocka_unit_test(clutter_stays_blood_flows),
-                                     cmocka_unit_test(a_mural_clot_is_no_chord)};
+                                     cmocka_unit_test(a_mural_clot_is_no_chord),
+                                     cmocka_unit_test(clots_hold_their_share),
+                                     cmocka_unit_test(pictures_show_their_forms)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

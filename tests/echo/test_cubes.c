@@ -109,15 +109,16 @@ static double energy(const laid *l) {
   return sum;
 }
 
-// Three maps: inside the grid, over its border, and one with two lumina, the second with clot.
-static void lay_with(const char *set, laid *l) {
+// Three maps: inside the grid, over its border, and one with two lumina, the second with clot of a
+// form.
+static void lay_with(const char *set, sonde_clot_form form, laid *l) {
   const splat_map maps[] = {
       {{{30, 0, 40, 1}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 0, 256, 0, 0},
       {{{60, 0.2f, 3, 1}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 256, 128, 0, 0},
       {{{20, -0.3f, 60, 1.5f}, {9, 0.5f, 2}, {-3, 1, 8}, {2, 1.5f, 4}}, 384, 128, 0, 2}};
   const splat_lumen lumen[] = {
-      {{0.2f, 2, 0.1f, 0.3f}, {0, 0.4f, 3, 0.2f}, {0}, 1, 0, 0},
-      {{-0.7f, 2.2f, 0, 0}, {0.5f, 0, 0.3f, 2}, {0.1f, 0, 0, 2e-3f}, 0.2f, 0, 1}};
+      {{0.2f, 2, 0.1f, 0.3f}, {0, 0.4f, 3, 0.2f}, {0}, 0, 0, 0, SONDE_CLOT_MURAL},
+      {{-0.7f, 2.2f, 0, 0}, {0.5f, 0, 0.3f, 2}, {0.1f, 0, 0, 2e-3f}, 0.4f, 0, 1, form}};
   const splat_job job = {.x = l->x,
                          .y = l->y,
                          .z = l->z,
@@ -136,12 +137,9 @@ static void lay_with(const char *set, laid *l) {
   sonde_echo_kernels_find(set)->splat(&job);
 }
 
-static bool in_lumen(double a, double b, double chord) { return a * a + b * b < 1 && a >= -chord; }
-
 // The same bits from all sets, the scalar twin's grid within single precision. What lies in the
 // lumina adds nothing.
-static void maps_are_laid_alike(void **state) {
-  (void)state;
+static void lay_alike(sonde_clot_form form) {
   laid *l = SONDE_NEW(laid, SETS);
   uint64_t draw = 7000;
   for (uint32_t i = 0; i < POINTS; ++i) {
@@ -152,7 +150,7 @@ static void maps_are_laid_alike(void **state) {
   double worst = 0;
   for (int k = 0; k < SETS; ++k) {
     if (sonde_echo_kernels_find(sets[k]) == NULL) continue;
-    lay_with(sets[k], &l[k]);
+    lay_with(sets[k], form, &l[k]);
     if (k < PLAIN) assert_memory_equal(l[k].grid, l[0].grid, sizeof l[k].grid);
   }
   for (int i = 0; i < (ROWS + 1) * STRIDE; ++i)
@@ -162,18 +160,25 @@ static void maps_are_laid_alike(void **state) {
   uint32_t inside = 0;
   for (uint32_t i = 384; i < POINTS; ++i) { // of the third map
     double x = (double)l->x[i], y = (double)l->y[i], z = (double)l->z[i];
-    if (!in_lumen(0.2 + 2 * x + 0.1 * y + 0.3 * z, 0.4 * x + 3 * y + 0.2 * z, 1) &&
-        !in_lumen(-0.7 + 2.2 * x, 0.5 + 0.3 * y + 2 * z,
-                  0.2 + sonde_clot_surface(1, 0.1 + 2e-3 * z, 0.5 + 0.3 * y + 2 * z)))
+    const double first[] = {0.2 + 2 * x + 0.1 * y + 0.3 * z, 0.4 * x + 3 * y + 0.2 * z},
+                 second[] = {-0.7 + 2.2 * x, 0.5 + 0.3 * y + 2 * z};
+    const double clot = sonde_clot_depth(form, 0.4, 1, 0.1 + 2e-3 * z, second[0], second[1]);
+    if (!(first[0] * first[0] + first[1] * first[1] < 1) &&
+        !(second[0] * second[0] + second[1] * second[1] < 1 && !(clot > 0)))
       continue;
     for (int k = 0; k < SETS; ++k) l[k].sign[i] = 0;
     ++inside;
   }
   laid *empty = &l[1];
-  lay_with("base", empty);
+  lay_with("base", form, empty);
   assert_true(inside > 20 && inside < 110);
   assert_memory_equal(empty->grid, l[0].grid, sizeof empty->grid);
   sonde_free(l);
+}
+
+static void maps_are_laid_alike(void **state) {
+  (void)state;
+  for (int f = SONDE_CLOT_MURAL; f <= SONDE_CLOT_RECANALISED; ++f) lay_alike((sonde_clot_form)f);
 }
 
 // A cube's middle, and the middles of its pieces beside a pressed vein, go where the interior takes

@@ -265,6 +265,7 @@ static void controls_survive_the_bytes(void **state) {
   c.posture = SONDE_POSTURE_STANDING;
   c.stiffness_scale = 1.0 / 0.7, c.damping_scale = 1.0 / 3.0, c.friction_scale = 0.1;
   c.pathology.wall_shear_pa = 12345.678;
+  c.pathology.form = SONDE_CLOT_RECANALISED;
   c.squeeze = 5, c.deep_breath = 6;
   c.duplex = (sonde_duplex_controls){SONDE_DUPLEX_POWER,
                                      {-0.01, 0.012, 0.004, 0.04, 0.1, 0},

@@ -48,6 +48,29 @@ static void a_case_is_read(void **state) {
   assert_int_equal(c.truth[2], SONDE_DECISION_CLOT);
 }
 
+// A clot has the form of its stage, or that which the file gives it; both are written and read
+// again.
+static void a_clot_has_a_form(void **state) {
+  (void)state;
+  static const struct {
+    const char *vein;
+    sonde_clot_form form;
+  } CASE[] = {{"stage: partial_mural", SONDE_CLOT_MURAL},
+              {"stage: free_floating", SONDE_CLOT_FLOATING},
+              {"stage: recanalised\n  form: mural", SONDE_CLOT_MURAL},
+              {"stage: partial_mural\n  form: recanalised", SONDE_CLOT_RECANALISED}};
+  for (size_t k = 0; k < SONDE_COUNT_OF(CASE); ++k) {
+    sonde_case c, again;
+    sonde_error error = {0};
+    if (sonde_case_parse(changed("stage: acute_occlusive", CASE[k].vein), "one.yaml", &c, &error))
+      fail_msg("%s", error.message);
+    assert_int_equal(c.pathology.form, CASE[k].form);
+    assert_int_equal(sonde_case_save(&c, "test_case_form.yaml", NULL), SONDE_OK);
+    if (sonde_case_load("test_case_form.yaml", &again, &error)) fail_msg("%s", error.message);
+    assert_int_equal(again.pathology.form, CASE[k].form);
+  }
+}
+
 // A leg in a position: it is read, written and read again, and takes no posture beside it.
 static void a_leg_has_its_position(void **state) {
   (void)state;
@@ -132,6 +155,7 @@ static void mistakes_are_named_with_their_line(void **state) {
       {"seed: 3", "seed: -3", "seed must be", 8},
       {"sitting", "lying", "supine, sitting, standing", 9},
       {"stage: acute_occlusive", "stage: odd", "odd", 11},
+      {"stage: acute_occlusive", "form: wavy\n  stage: partial_mural", "mural, floating", 11},
       {"share: 0.1", "share: 1.1", "from 0 to 1", 12},
       {"  from: {segment: femoral_mid, share: 0.1}\n", "", "both from and to", 11},
       {"thrombosis: true", "thrombosis: perhaps", "false, true", 15},
@@ -478,6 +502,7 @@ static void the_cases_that_ship_are_good(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_case_is_read),
+      cmocka_unit_test(a_clot_has_a_form),
       cmocka_unit_test(a_leg_has_its_position),
       cmocka_unit_test(mistakes_are_named_with_their_line),
       cmocka_unit_test(the_truth_must_fit),

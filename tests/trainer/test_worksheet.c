@@ -196,7 +196,9 @@ static void the_truth_of_a_place(void **state) {
        SONDE_SHEET_OCCLUSIVE},
       {"chronic_occlusive", SONDE_SHEET_NOT_COMPRESSIBLE, SONDE_SHEET_CHRONIC,
        SONDE_SHEET_OCCLUSIVE},
-      {"partial_mural", SONDE_SHEET_PARTLY, SONDE_SHEET_ACUTE, SONDE_SHEET_PART_OF_LUMEN}};
+      {"partial_mural", SONDE_SHEET_PARTLY, SONDE_SHEET_ACUTE, SONDE_SHEET_PART_OF_LUMEN},
+      {"free_floating", SONDE_SHEET_PARTLY, SONDE_SHEET_ACUTE, SONDE_SHEET_FREE_FLOATING},
+      {"recanalised", SONDE_SHEET_PARTLY, SONDE_SHEET_CHRONIC, SONDE_SHEET_PART_OF_LUMEN}};
   for (size_t s = 0; s < SONDE_COUNT_OF(STAGE); ++s) {
     bench *b = bench_of(STAGE[s].stage, 85 * MM, 125 * MM);
     const sonde_sheet_verdict *v = judge(b);

@@ -28,6 +28,7 @@ sonde_session_controls sonde_controls_clean(const sonde_session_controls *wanted
   p->thrombus_to_m = usable_real(p->thrombus_to_m, q->thrombus_to_m, -10.0, 10.0);
   p->lumen_scale = usable_real(p->lumen_scale, q->lumen_scale, 0.1, 3.0);
   p->echogenicity = usable_real(p->echogenicity, q->echogenicity, 0.0, 1.0);
+  if ((unsigned)p->form > SONDE_CLOT_RECANALISED) p->form = q->form;
   controls.echo = sonde_echo_settings_clamp(wanted->echo);
   controls.duplex = sonde_duplex_clean(&wanted->duplex, &before->duplex);
   if ((unsigned)controls.posture >= SONDE_POSTURE_COUNT) controls.posture = before->posture;

@@ -46,7 +46,7 @@ void sonde_controls_put(bytes_cursor *w, const sonde_session_controls *c) {
   bytes_u32(w, c->squeeze);
   bytes_u32(w, c->deep_breath);
   bytes_u32(w, c->duplex.shown);
-  bytes_u32(w, 0);
+  bytes_u32(w, c->pathology.form);
   for (int i = 0; i < BOX; ++i) bytes_f64(w, (&c->duplex.box.left_m)[i]);
   bytes_f64(w, c->duplex.scale_m_s);
   bytes_f64(w, c->duplex.gain_db);
@@ -94,7 +94,8 @@ void sonde_controls_get(bytes_reader *r, int version, sonde_session_controls *c)
     c->squeeze = bytes_take_u32(r);
     c->deep_breath = bytes_take_u32(r);
     const uint32_t shown = bytes_take_u32(r);
-    (void)bytes_take_u32(r);
+    const uint32_t form = bytes_take_u32(r);
+    c->pathology.form = form <= SONDE_CLOT_RECANALISED ? (sonde_clot_form)form : SONDE_CLOT_MURAL;
     sonde_duplex_controls duplex = {.shown = shown <= SONDE_DUPLEX_POWER ? (sonde_duplex_shown)shown
                                                                          : SONDE_DUPLEX_OFF};
     for (int i = 0; i < BOX; ++i) (&duplex.box.left_m)[i] = bytes_take_f64(r);

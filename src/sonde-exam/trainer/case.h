@@ -7,6 +7,7 @@
 extern const char *const sonde_case_levels[];   // NULL-terminated, in the order of the enum
 extern const char *const sonde_case_postures[]; // likewise
 extern const char *const sonde_case_lesions[];
+extern const char *const sonde_case_clot_forms[]; // of sonde_clot_form
 extern const char *const sonde_case_sexes[];
 extern const char *const sonde_case_sides[];
 extern const char *const sonde_case_positions[]; // of sonde_limb_position, then straight

@@ -75,10 +75,12 @@ void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out)
   bool clot = below(&d, 2) == 0;
   if (clot) { // its stage and stretch, and the truth that follows
     static const char *const STAGE[] = {"acute_occlusive", "subacute_occlusive",
-                                        "chronic_occlusive", "partial_mural"};
+                                        "chronic_occlusive", "partial_mural", "free_floating"};
     uint32_t stage = below(&d, out->level == SONDE_CASE_FIRST  ? 1
                                : out->level == SONDE_CASE_EASY ? 3
                                                                : 4);
+    if (stage == 3 && out->seed % 2 == 1)
+      stage = 4; // of those that fill a part every second floats
     uint32_t length = out->level == SONDE_CASE_HARD ? 1 : 1 + below(&d, 3);
     uint32_t from = below(&d, SEGMENT_COUNT + 1 - length), to = from + length - 1;
     sonde_status status = sonde_pathology_preset(STAGE[stage], &out->pathology, NULL);
@@ -91,7 +93,8 @@ void sonde_case_generate(uint64_t seed, sonde_case_level level, sonde_case *out)
     out->extent.to.share = rounded(uniform(&d, 0.85, 1), 100);
     for (uint32_t i = from; i <= to; ++i) out->truth[i] = SONDE_DECISION_CLOT;
     out->thrombosis = true;
-    static const char *const WORD[] = {"Acute", "Subacute", "Chronic", "Partial (mural)"};
+    static const char *const WORD[] = {"Acute", "Subacute", "Chronic", "Partial (mural)",
+                                       "Free-floating"};
     snprintf(out->diagnosis, sizeof out->diagnosis, "%s deep vein thrombosis: %s%s%s", WORD[stage],
              sonde_segment_title(SEGMENTS[from]), to > from ? " to " : "",
              to > from ? sonde_segment_title(SEGMENTS[to]) : "");

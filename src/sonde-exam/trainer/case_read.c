@@ -9,6 +9,7 @@
 const char *const sonde_case_levels[] = {"first", "easy", "hard", NULL};
 const char *const sonde_case_postures[] = {"supine", "sitting", "standing", NULL};
 const char *const sonde_case_lesions[] = {"node", "cyst", "haematoma", NULL};
+const char *const sonde_case_clot_forms[] = {"mural", "floating", "recanalised", NULL};
 const char *const sonde_case_sexes[] = {"drawn", "female", "male", NULL};
 const char *const sonde_case_sides[] = {"right", "left", NULL};
 const char *const sonde_case_positions[] = {"supine_turned", "prone_bent", "sitting",  "supine",
@@ -167,6 +168,8 @@ static void read_clot(sonde_reader *reader, sonde_place map, sonde_pathology *pa
   if (stage && sonde_pathology_preset(stage, pathology, &error))
     sonde_reader_pass(reader, at, &error);
   sonde_pathology *p = pathology;
+  p->form =
+      (sonde_clot_form)sonde_read_choice(reader, map, "form", sonde_case_clot_forms, (int)p->form);
   p->thrombus_fraction = sonde_read_real(reader, map, "fraction", 0, 1, p->thrombus_fraction);
   p->thrombus_modulus_pa =
       1e3 * sonde_read_real(reader, map, "modulus_kpa", 0, 500, 1e-3 * p->thrombus_modulus_pa);
@@ -194,14 +197,14 @@ static uint32_t read_some(sonde_reader *reader, sonde_place list, const char *wh
 // What fills the femoral vein, and what else the thigh has.
 static void read_pathology(sonde_reader *reader, sonde_place root, sonde_case *c) {
   static const char *const VEIN[] = {
-      "stage",        "from",        "to",       "fraction", "modulus_kpa",
-      "echogenicity", "lumen_scale", "wall_kpa", "webs",     NULL};
+      "stage",        "from",        "to",       "form", "fraction", "modulus_kpa",
+      "echogenicity", "lumen_scale", "wall_kpa", "webs", NULL};
   static const char *const LESION[] = {"kind",    "at",           "across_mm", "depth_mm",
                                        "size_mm", "echogenicity", NULL};
   static const double ECHO[] = {0.25, 0.0, 0.4}; // of node, cyst, haematoma
-  static const char *const BRANCH[] = {"branch",   "stage",       "from",         "to",
-                                       "fraction", "modulus_kpa", "echogenicity", "lumen_scale",
-                                       "wall_kpa", NULL};
+  static const char *const BRANCH[] = {"branch",      "stage",    "from",        "to",
+                                       "form",        "fraction", "modulus_kpa", "echogenicity",
+                                       "lumen_scale", "wall_kpa", NULL};
   sonde_place vein = sonde_read_find(reader, root, "vein");
   if (vein) {
     sonde_read_keys(reader, vein, "vein", VEIN);

@@ -31,6 +31,9 @@ static void put_station(sonde_file *file, const char *key, const sonde_station *
 static void put_clot(sonde_file *file, const char *before, const sonde_pathology *p,
                      const sonde_case_extent *extent) {
   sonde_file_printf(file, "%sstage: %s", before, p->name);
+  sonde_pathology usual;
+  if (sonde_pathology_preset(p->name, &usual, NULL) || usual.form != p->form)
+    sonde_file_printf(file, "%sform: %s", before, sonde_case_clot_forms[p->form]);
   sonde_file_printf(file, "%sfraction: %.12g", before, p->thrombus_fraction);
   sonde_file_printf(file, "%smodulus_kpa: %.12g", before, 1e-3 * p->thrombus_modulus_pa);
   sonde_file_printf(file, "%sechogenicity: %.12g", before, p->echogenicity);

@@ -59,7 +59,9 @@ static void look_at_vein(const sonde_plan_point *place, double reach_m, const so
     v->clot = true;
     const bool whole = clot->thrombus_fraction >= OCCLUSIVE;
     v->truth = whole ? SONDE_SHEET_NOT_COMPRESSIBLE : SONDE_SHEET_PARTLY;
-    v->truth_kind = whole ? SONDE_SHEET_OCCLUSIVE : SONDE_SHEET_PART_OF_LUMEN;
+    v->truth_kind = whole                               ? SONDE_SHEET_OCCLUSIVE
+                    : clot->form == SONDE_CLOT_FLOATING ? SONDE_SHEET_FREE_FLOATING
+                                                        : SONDE_SHEET_PART_OF_LUMEN;
     v->truth_age = sonde_clot_age(clot->thrombus_modulus_pa);
   }
 }

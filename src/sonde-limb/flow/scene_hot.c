@@ -22,12 +22,13 @@ static double clot_scale(const piece *p, uint32_t i) {
   enum { SIDE = 24 };
   const double solid = scene_solid(p->scene, p->vessel, i);
   const double along_m = p->scene->interior->section[p->vessel][i].along_m;
+  const sonde_clot_form form = p->scene->interior->pathology[p->vessel].form;
   double all = 0, free = 0;
   for (int n = 0; n < SIDE * SIDE && solid > 0; ++n) {
     const double a = (n % SIDE + 0.5) / SIDE * 2 - 1, b = (n / SIDE + 0.5) / SIDE * 2 - 1;
     const double speed = fmax(1 - a * a - b * b, 0);
     all += speed;
-    free += -a > 1 - 2 * solid + sonde_clot_surface(p->vessel, along_m, b) ? 0 : speed;
+    free += sonde_clot_depth(form, solid, p->vessel, along_m, a, b) > 0 ? 0 : speed;
   }
   return free > 0 ? (1 - solid) * all / free : 1;
 }
@@ -52,7 +53,8 @@ static bool blood_at(const piece *p, sonde_vec3 drawn, scene_blood *blood) {
   const double solid = scene_solid(s, p->vessel, p->i);
   const sonde_vessel_section *low = &s->interior->section[p->vessel][p->i];
   const double along_m = low->along_m + share * (low[1].along_m - low->along_m);
-  if (solid > 0 && -a > 1 - 2 * solid + sonde_clot_surface(p->vessel, along_m, b)) return false;
+  const sonde_clot_form form = s->interior->pathology[p->vessel].form;
+  if (solid > 0 && sonde_clot_depth(form, solid, p->vessel, along_m, a, b) > 0) return false;
   const scene_section *section = &s->section[p->vessel][p->i];
   const bool artery = s->interior->course[p->vessel].kind == SONDE_VESSEL_ARTERY;
   // The profile of the segment's main vein or the arteries, scaled to the section's mean velocity;

@@ -20,7 +20,8 @@ typedef struct blood_segment {
   splat_map map;
   double flowed;  // by the mean flow, in segments
   double streaks; // share by which the amplitudes of streaks differ from each other
-  double solid;   // share of the short axis that clot fills, from the far side
+  double solid;   // share of the lumen that clot fills
+  sonde_clot_form form;
   uint32_t count; // streamlines
   uint32_t salt, vessel;
   int32_t segment;
@@ -31,8 +32,8 @@ static const double sonde_segment_m = 2e-3; // along the leg's axis
 // Whether a place of a segment lies in clot: coordinates in the segment's unit lumen.
 static inline bool sonde_blood_in_clot(const blood_segment *s, float x, float y, float z) {
   double along_m = (s->segment + 0.5 + (double)z) * sonde_segment_m;
-  double surface = sonde_clot_surface(s->vessel, along_m, 2 * (double)y);
-  return s->solid > 0 && -2 * (double)x > 1 - 2 * s->solid + surface;
+  const double a = 2 * (double)x, b = 2 * (double)y;
+  return s->solid > 0 && sonde_clot_depth(s->form, s->solid, s->vessel, along_m, a, b) > 0;
 }
 
 // What waits, per band in the order in which it came; ends are negative.

@@ -103,6 +103,7 @@ void sonde_echo_blood(sonde_echo *echo) {
       blood_segment one = {.flowed = moves.path_m / sonde_segment_m,
                            .streaks = most_streaks * moves.rouleaux,
                            .solid = sonde_echo_solid(echo, which, low.rest_centre_m.z),
+                           .form = sonde_echo_pathology(echo, which)->form,
                            .salt = (uint32_t)echo->seed + which,
                            .segment = k,
                            .vessel = which};

@@ -31,12 +31,12 @@ enum { FASCIA_SHEETS = 3 };
 static const float fascia_sheet_m[FASCIA_SHEETS] = {0, 0.35e-3f, 0.75e-3f};
 
 // A lumen over one map: forms of its scatterers' coordinates, 1 on the wall at rest, and of the
-// length along the vessel, m. A mural clot fills what lies beyond its free surface on the far side.
+// length along the vessel, m. Clot fills a part.
 typedef struct splat_lumen {
   float along[4], across[4], axial[4];
-  float chord;     // of the clot's share, in radii; 1: no clot
-  float amplitude; // of the scatterers in the lumen: what clutter shows of them
-  uint32_t vessel; // whose clot it is
+  float solid, amplitude; // clot's share; of the scatterers in blood: what clutter shows of them
+  uint32_t vessel;        // whose clot it is
+  sonde_clot_form form;
 } splat_lumen;
 
 // Scatterers of one affine map: (column, elevation over its reach, sample) =
@@ -131,7 +131,8 @@ typedef struct tissue_vessel {
   float sheath_m, clot_loss; // of bright fat around it, 0: none; dB/m/MHz one way
   float lumps_db, layers_db; // unevenness of the clot
   uint32_t number;           // among the leg's vessels
-  float cusp_bend;           // how far the cusps of its valves are closed, 0 to 1
+  sonde_clot_form form;
+  float cusp_bend; // how far the cusps of its valves are closed, 0 to 1
 } tissue_vessel;
 
 typedef enum tissue_lesion_kind { TISSUE_NODE, TISSUE_CYST, TISSUE_HAEMATOMA } tissue_lesion_kind;

@@ -28,9 +28,10 @@ static void splat(const splat_job *job) {
       for (uint32_t k = map->lumen; k < map->lumen + map->lumens; ++k) {
         const splat_lumen *l = &job->lumen[k];
         double a = form_at(l->along, x, y, z), b = form_at(l->across, x, y, z);
-        double chord = (double)l->chord;
-        if (chord < 1) chord += sonde_clot_surface(l->vessel, form_at(l->axial, x, y, z), b);
-        if (a * a + b * b < 1 && a >= -chord) shown = (double)l->amplitude;
+        const double along_m = form_at(l->axial, x, y, z), solid = (double)l->solid;
+        if (a * a + b * b < 1 &&
+            !(solid > 0 && sonde_clot_depth(l->form, solid, l->vessel, along_m, a, b) > 0))
+          shown = (double)l->amplitude;
       }
       const double weight = (double)job->sign[i] * (double)map->m[0][3] * shown * height;
       // Two columns, three rows.

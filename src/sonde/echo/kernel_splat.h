@@ -102,9 +102,9 @@ INLINE floats in_lumina(const splat_job *job, const splat_map *map, floats x, fl
     floats a = l->along[0] + l->along[1] * x + l->along[2] * y + l->along[3] * z;
     floats b = l->across[0] + l->across[1] * x + l->across[2] * y + l->across[3] * z;
     ints in = a * a + b * b < 1;
-    if (l->chord < 1) {
+    if (l->solid > 0) {
       floats along_m = l->axial[0] + l->axial[1] * x + l->axial[2] * y + l->axial[3] * z;
-      in = in & (a >= -l->chord - clot_surface(l->vessel, along_m, b));
+      in = in & (clot_depth(l->form, l->solid, l->vessel, along_m, a, b) <= 0);
     }
     size = vselect(in, vset(l->amplitude), size);
   }

@@ -36,6 +36,24 @@ INLINE floats clot_surface(uint32_t vessel, floats along, floats across) {
   return sum;
 }
 
+// sonde_clot_depth() for a vector of places.
+INLINE floats clot_depth(sonde_clot_form form, float solid, uint32_t vessel, floats along, floats a,
+                         floats b) {
+  if (form == SONDE_CLOT_MURAL) return -a - (1 - 2 * solid) - clot_surface(vessel, along, b);
+  floats turns = clot_winds_per_m * along + sonde_clot_start(vessel, 0), c, s;
+  turn(turns - vfloor(turns), &c, &s);
+  if (form == SONDE_CLOT_FLOATING) {
+    const float radius = __builtin_sqrtf(solid), off = clot_wanders[0] * (1 - radius);
+    const floats x = a - off * c, y = b - off * s;
+    return radius - vsqrt(x * x + y * y);
+  }
+  const float open = 1 - solid, one = __builtin_sqrtf(clot_wide_share * open),
+              other = __builtin_sqrtf((1 - clot_wide_share) * open);
+  const float far = clot_wanders[1], off = far * (1 - one), opposite = far * (1 - other);
+  const floats x = a - off * c, y = b - off * s, u = a + opposite * c, v = b + opposite * s;
+  return vmin(vsqrt(x * x + y * y) - one, vsqrt(u * u + v * v) - other);
+}
+
 // Unevenness of a clot, dB: lumps of 2 mm and finer grain, and the layers in which it grew.
 INLINE floats clot_grain(const tissue_vessel *it, knots *memory, floats theta, floats s,
                          floats depth, floats inward) {
@@ -98,9 +116,9 @@ INLINE void vessels(const tissue_job *job, const tissue_point *p, uint32_t line,
     ints clot = (level[v] <= 0) & (field_at(job, at + VESSEL_CLOT * n) >= 0.5f);
     if (!vany(clot)) continue;
     const floats a = field_at(job, at);
+    const floats b = field_at(job, at + VESSEL_LONG * n);
     if (it->clot_fraction < 1)
-      clot &= -a > 1 - 2 * it->clot_fraction +
-                       clot_surface(it->number, p->s, field_at(job, at + VESSEL_LONG * n));
+      clot &= clot_depth(it->form, it->clot_fraction, it->number, p->s, a, b) > 0;
     floats scatter = vset(it->clot_scatter);
     if (!job->plain)
       scatter =

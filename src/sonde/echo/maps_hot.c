@@ -73,9 +73,10 @@ static void map_pieces(sonde_echo *echo, const moved_cube *c) {
                       {dot_points(d, across), edge * across[0], edge * across[1], edge * across[2]},
                       {(float)c->wall[k].along_m, (float)echo->cell_m * along[0],
                        (float)echo->cell_m * along[1], (float)echo->cell_m * along[2]},
-                      c->wall[k].solid > 0 ? 1 - 2 * c->wall[k].solid : 1,
+                      c->wall[k].solid,
                       sonde_clutter(echo) * sqrtf(w[WALL_SHORT][g] * w[WALL_LONG][g]) * scale,
-                      which};
+                      which,
+                      sonde_echo_pathology(echo, which)->form};
     if (c->wall[k].solid < 1 && !is_beyond(l->along) && !is_beyond(l->across)) ++lumens;
   }
   for (uint32_t piece = 0; piece < 8; ++piece) {

@@ -325,6 +325,7 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
         .lumps_db = 1.5f + 4 * age,
         .layers_db = 2.5f + 5.5f * age,
         .number = which,
+        .form = p->form,
         .cusp_bend = (float)sonde_blood_of(echo, which).shut};
   }
   for (uint32_t k = 0; k < job->lesions; ++k) {

@@ -76,7 +76,8 @@ bool sonde_truth_at(const sonde_echo *echo, const sonde_image *image, uint32_t c
     pixel->vessel = number + 1;
     pixel->label = here ? SONDE_LABEL_ARTERY : SONDE_LABEL_VEIN;
     const double solid = sonde_echo_solid(echo, number, v.rest_centre_m.z);
-    if (solid > 0 && -a > 1 - 2 * solid + sonde_clot_surface(number, along_m, b)) {
+    const sonde_clot_form form = sonde_echo_pathology(echo, number)->form;
+    if (solid > 0 && (solid >= 1 || sonde_clot_depth(form, solid, number, along_m, a, b) > 0)) {
       pixel->label = SONDE_LABEL_THROMBUS;
       return true;
     }

@@ -1,8 +1,10 @@
-// Free surface of a mural clot: what bounds it in the picture, in the labels and for the blood.
+// Where a clot ends that does not fill its vein: what bounds it in the picture, in the labels and
+// for the blood.
 #ifndef SONDE_SRC_CLOT_H
 #define SONDE_SRC_CLOT_H
 
 #include "base/maths.h"
+#include "sonde/interior.h"
 
 #include <stdint.h>
 
@@ -38,6 +40,30 @@ static inline double sonde_clot_surface(uint32_t vessel, double along_m, double 
     sum += (double)w->height * cos(2 * SONDE_PI * turns);
   }
   return sum;
+}
+
+// Turns per metre of the middle of a floating clot and of the channels of a recanalised one, and
+// how far they wander, of the room that they have; the wider channel's share of all that is open.
+// The channels keep apart where clot fills half of the lumen or more.
+static const float clot_winds_per_m = 12, clot_wanders[2] = {0.6f, 0.9f}, clot_wide_share = 0.75f;
+
+// How deep a place of the lumen lies in clot, in radii of the lumen; negative in blood. `a` and `b`
+// are its coordinates over the half axes, a from the far wall; solid < 1 is the clot's share.
+static inline double sonde_clot_depth(sonde_clot_form form, double solid, uint32_t vessel,
+                                      double along_m, double a, double b) {
+  if (form == SONDE_CLOT_MURAL)
+    return -a - (1 - 2 * solid) - sonde_clot_surface(vessel, along_m, b);
+  const double turns = (double)clot_winds_per_m * along_m + (double)sonde_clot_start(vessel, 0);
+  const double c = cos(2 * SONDE_PI * turns), s = sin(2 * SONDE_PI * turns);
+  if (form == SONDE_CLOT_FLOATING) {
+    const double radius = sqrt(solid), off = (double)clot_wanders[0] * (1 - radius);
+    return radius - hypot(a - off * c, b - off * s);
+  }
+  const double open = 1 - solid, wide = (double)clot_wide_share;
+  const double one = sqrt(wide * open), other = sqrt((1 - wide) * open);
+  const double far = (double)clot_wanders[1], off = far * (1 - one), opposite = far * (1 - other);
+  return fmin(hypot(a - off * c, b - off * s) - one,
+              hypot(a + opposite * c, b + opposite * s) - other);
 }
 
 #endif

@@ -277,8 +277,9 @@ sonde_label sonde_vessels_label(const sonde_interior *in, sonde_vec3 rest, doubl
     if (p->thrombus_fraction >= 1) return SONDE_LABEL_THROMBUS;
     double deep = -v_dot(d, v.flat_axis) / v.rest_radius_m;
     double across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.rest_radius_m;
-    bool clot = deep > 1 - 2 * p->thrombus_fraction + sonde_clot_surface(which, along, across);
-    return clot ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
+    const double inside =
+        sonde_clot_depth(p->form, p->thrombus_fraction, which, along, -deep, across);
+    return inside > 0 ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
   }
   return wall;
 }

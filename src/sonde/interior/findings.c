@@ -101,7 +101,8 @@ sonde_status sonde_interior_set_findings(sonde_interior *in, const sonde_finding
       return sonde_fail(error, SONDE_ARGUMENT, "'%s' is an artery; clots lie in veins", b->branch);
     if (!within(p->thrombus_fraction, 0, 1) || !within(p->echogenicity, 0, 1) ||
         (clot && !within(p->thrombus_modulus_pa, 100, 1e7)) || !within(p->lumen_scale, 0.1, 3) ||
-        !within(p->wall_shear_pa, 0, 1e7) || !isfinite(p->thrombus_from_m + p->thrombus_to_m))
+        !within(p->wall_shear_pa, 0, 1e7) || !isfinite(p->thrombus_from_m + p->thrombus_to_m) ||
+        (unsigned)p->form > SONDE_CLOT_RECANALISED)
       return sonde_fail(error, SONDE_ARGUMENT, "branch '%s': a value is out of range", b->branch);
   }
   if (status) return status;

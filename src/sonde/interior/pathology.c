@@ -7,8 +7,14 @@
 
 enum { VENOUS_MMHG = 10, ARTERIAL_MMHG = 95 };
 
-static const char *const names[] = {
-    "healthy", "partial_mural", "acute_occlusive", "subacute_occlusive", "chronic_occlusive", NULL};
+static const char *const names[] = {"healthy",
+                                    "partial_mural",
+                                    "free_floating",
+                                    "acute_occlusive",
+                                    "subacute_occlusive",
+                                    "chronic_occlusive",
+                                    "recanalised",
+                                    NULL};
 
 static const sonde_pathology presets[] = {
     {.name = "healthy", .lumen_scale = 1.0},
@@ -17,6 +23,12 @@ static const sonde_pathology presets[] = {
      .thrombus_modulus_pa = 12e3,
      .lumen_scale = 1.05,
      .echogenicity = 0.45},
+    {.name = "free_floating",
+     .thrombus_fraction = 0.45,
+     .thrombus_modulus_pa = 6e3,
+     .lumen_scale = 1.1,
+     .echogenicity = 0.4,
+     .form = SONDE_CLOT_FLOATING},
     {.name = "acute_occlusive",
      .thrombus_fraction = 1.0,
      .thrombus_modulus_pa = 6e3,
@@ -32,6 +44,12 @@ static const sonde_pathology presets[] = {
      .thrombus_modulus_pa = 45e3,
      .lumen_scale = 0.85,
      .echogenicity = 0.95},
+    {.name = "recanalised",
+     .thrombus_fraction = 0.65,
+     .thrombus_modulus_pa = 45e3,
+     .lumen_scale = 0.85,
+     .echogenicity = 0.8,
+     .form = SONDE_CLOT_RECANALISED},
 };
 
 const char *const *sonde_pathology_names(void) { return names; }
@@ -55,7 +73,7 @@ sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology
     return SONDE_OK;
   }
   return sonde_fail(error, SONDE_NOT_FOUND,
-                    "unknown case '%s'; expected healthy, partial_mural, acute_occlusive, "
-                    "subacute_occlusive or chronic_occlusive",
+                    "unknown case '%s'; expected healthy, partial_mural, free_floating, "
+                    "acute_occlusive, subacute_occlusive, chronic_occlusive or recanalised",
                     name != NULL ? name : "");
 }

@@ -97,6 +97,7 @@ export const toldDe = {
   "Acute": "Akute",
   "Subacute": "Subakute",
   "Chronic": "Chronische",
+  "Free-floating": "Flottierende",
   "Partial (mural)": "Partielle (wandständige)",
   "{one} deep vein thrombosis: {two} to {three}": "{one} tiefe Beinvenenthrombose: {two} bis {three}",
   "{one} deep vein thrombosis: {two}": "{one} tiefe Beinvenenthrombose: {two}",

@@ -98,6 +98,7 @@ export const toldFr: Record<keyof typeof toldDe, string> = {
   "Acute": "aiguë",
   "Subacute": "subaiguë",
   "Chronic": "chronique",
+  "Free-floating": "flottante",
   "Partial (mural)": "partielle (pariétale)",
   "{one} deep vein thrombosis: {two} to {three}": "Thrombose veineuse profonde {one} : {two} à {three}",
   "{one} deep vein thrombosis: {two}": "Thrombose veineuse profonde {one} : {two}",
