@@ -6,7 +6,7 @@ import { execFileSync } from "node:child_process";
 import { mkdirSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join, resolve } from "node:path";
-import { PATIENCE_MS, browserPath, picture } from "./drive.mjs";
+import { PATIENCE_MS, browserPath, openBrowser, picture } from "./drive.mjs";
 import { contrastFaults } from "./inspect.mjs";
 
 const [writer, web, out] = process.argv.slice(2).map((p) => resolve(p));
@@ -25,7 +25,7 @@ const check = (condition, what) => {
 const close = (shown, value, decimals, what) => assert.ok(Math.abs(Number(shown.replace("\u2212", "-")) - value) <= 0.5 * 10 ** -decimals + 1e-9, `${what}: ${shown} shows ${value}`);
 const NASTY = "<b>&\"'\u0001\ufffd</script><script>alert(1)</script>";
 
-const browser = await chromium.launch({ executablePath: browserPath, args: ["--no-sandbox", "--disable-gpu"] });
+const browser = await openBrowser(chromium);
 
 // Everything that the page shows, read in the page.
 const readPage = () => {

@@ -2,14 +2,12 @@
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import path from "node:path";
+import { openBrowser as launch } from "./drive.mjs";
 
 /** Chromium without a network. @param web the page's build directory */
 export async function openBrowser(web) {
   const { chromium } = createRequire(path.resolve(web, "package.json"))("playwright-core");
-  const browser = await chromium.launch({
-    executablePath: "/usr/bin/chromium",
-    args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking"],
-  });
+  const browser = await launch(chromium);
   const context = await browser.newContext({ viewport: { width: 1000, height: 900 }, offline: true });
   return { context, close: () => browser.close() };
 }
