@@ -43,11 +43,22 @@ static inline sonde_world_def fixture_world_def(void) {
   return def;
 }
 
-static inline uint32_t fixture_middle(sonde_mesh *mesh, uint32_t *count, uint32_t a, uint32_t b) {
-  sonde_vec3 m = v_unit(v_add(mesh->vertices[a], mesh->vertices[b]), vec3(1, 0, 0));
-  for (uint32_t i = 0; i < *count; ++i)
-    if (v_distance(mesh->vertices[i], m) < 1e-9) return i;
-  mesh->vertices[*count] = m;
+// The edges of a mesh that is being split: of each corner those to corners of a higher number, at
+// most six, with the vertex in the middle of each.
+typedef struct fixture_edges {
+  uint32_t count, to[6], middle[6];
+} fixture_edges;
+
+static inline uint32_t fixture_middle(sonde_mesh *mesh, uint32_t *count, fixture_edges *edges,
+                                      uint32_t a, uint32_t b) {
+  fixture_edges *of = &edges[a < b ? a : b];
+  const uint32_t to = a < b ? b : a;
+  for (uint32_t i = 0; i < of->count; ++i)
+    if (of->to[i] == to) return of->middle[i];
+  assert_true(of->count < 6);
+  of->to[of->count] = to;
+  of->middle[of->count++] = *count;
+  mesh->vertices[*count] = v_unit(v_add(mesh->vertices[a], mesh->vertices[b]), vec3(1, 0, 0));
   return (*count)++;
 }
 
@@ -66,17 +77,20 @@ static inline sonde_mesh fixture_sphere(int levels, double radius) {
   uint32_t count = 6, used = 8;
   for (int k = 0; k < levels; ++k) {
     assert_int_equal(sonde_mesh_copy(&mesh, &next, NULL), SONDE_OK);
+    fixture_edges *edges = calloc(count, sizeof *edges);
+    assert_true(edges != NULL);
     uint32_t out = 0;
     for (uint32_t f = 0; f < used; ++f) {
       const uint32_t *v = mesh.faces[f];
       uint32_t m[3];
-      for (int e = 0; e < 3; ++e) m[e] = fixture_middle(&next, &count, v[e], v[(e + 1) % 3]);
+      for (int e = 0; e < 3; ++e) m[e] = fixture_middle(&next, &count, edges, v[e], v[(e + 1) % 3]);
       const uint32_t split[4][3] = {
           {v[0], m[0], m[2]}, {v[1], m[1], m[0]}, {v[2], m[2], m[1]}, {m[0], m[1], m[2]}};
       memcpy(next.faces[out], split, sizeof split);
       out += 4;
     }
     used = out;
+    free(edges);
     sonde_mesh_clear(&mesh);
     mesh = next;
   }
