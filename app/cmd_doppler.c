@@ -199,9 +199,8 @@ static sonde_status take(const options *a, const sonde_model *model, record *r,
   sonde_doppler *doppler = NULL;
   if (!status) status = sonde_doppler_create(&def, &doppler, error);
   r->count = (uint32_t)(a->seconds / HOP_S), r->limit = sonde_doppler_limit(&def);
-  // The spectrum of slower blood reaches into the filter: a window blurs it by two of its bins.
   const double window_s = fmax(SONDE_DOPPLER_WINDOW_S, SONDE_DOPPLER_PULSES / def.pulse_hz);
-  r->slowest = 2 * r->limit * (def.filter_hz + 2 / window_s) / def.pulse_hz;
+  r->slowest = sonde_doppler_slowest(r->limit, def.filter_hz, window_s, def.pulse_hz);
   r->mean = calloc(r->count, sizeof *r->mean), r->peak = calloc(r->count, sizeof *r->peak);
   r->truth = calloc(r->count, sizeof *r->truth), r->lumen = calloc(r->count, sizeof *r->lumen);
   r->grey = calloc(r->count, SONDE_DOPPLER_BINS);

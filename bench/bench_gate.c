@@ -99,7 +99,7 @@ static void listen(sonde_model *model, uint32_t site, sonde_interior *in, sonde_
     const double x = clamp((time_s - 1) / SONDE_GATE_COLUMN_S, 0, COLUMNS + 18);
     c->truth[n] = truth[(int)x] + (x - floor(x)) * (truth[(int)x + 1] - truth[(int)x]);
   }
-  *slowest = 2 * axes.limit_m_s * (s.filter_hz + 2 / axes.window_s) / axes.pulse_hz;
+  *slowest = axes.slowest_m_s;
   sonde_gate_destroy(gate);
   sonde_flow_scene_destroy(scene);
   sonde_free(still);

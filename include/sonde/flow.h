@@ -184,6 +184,12 @@ SONDE_API double sonde_doppler_truth(const sonde_doppler *doppler,
 /** Velocity from the phase between neighbours of the last SONDE_DOPPLER_BINS pulses. @thread tick
  */
 SONDE_API double sonde_doppler_phase_velocity(const sonde_doppler *doppler);
+/** Slowest velocity whose spectrum keeps clear of the wall filter, into which a window blurs slower
+ *  ones by two of its bins. @param limit_m_s the highest that is not folded @thread any */
+static inline double sonde_doppler_slowest(double limit_m_s, double filter_hz, double window_s,
+                                           double pulse_hz) {
+  return 2 * limit_m_s * (filter_hz + 2 / window_s) / pulse_hz;
+}
 /** Highest velocity that is not folded: c pulse_hz / (4 f |cos angle|). @thread any */
 SONDE_API double sonde_doppler_limit(const sonde_doppler_def *def);
 

@@ -57,9 +57,10 @@ typedef struct sonde_gate_spectrum {
   bool on;                      /**< else nothing else is set */
   sonde_gate_settings settings; /**< as they were used */
   double pulse_hz;
-  double window_s;  /**< of the pulses of a column */
-  double limit_m_s; /**< half the width of the velocities that are shown */
-  double low_m_s;   /**< the lowest of them; the highest is 2 limits above it */
+  double window_s;    /**< of the pulses of a column */
+  double limit_m_s;   /**< half the width of the velocities that are shown */
+  double low_m_s;     /**< the lowest of them; the highest is 2 limits above it */
+  double slowest_m_s; /**< from which blood passes the wall filter whole, along the beam */
   uint32_t count;
   const sonde_gate_column *column; /**< [count] oldest first, without gaps */
 } sonde_gate_spectrum;

@@ -443,7 +443,8 @@ export interface SpectrumFrame {
   limit_cm_s: number;
   low_cm_s: number;
   pulse_hz: number;
-  window_s: number;
+  /** from which blood passes the wall filter whole, along the beam */
+  slowest_cm_s: number;
   column_s: number;
   columns: SpectrumColumn[];
 }
@@ -526,7 +527,7 @@ function decodeSpectrum(bytes: ArrayBuffer, at: number): SpectrumFrame | null {
     limit_cm_s: c.f32(),
     low_cm_s: c.f32(),
     pulse_hz: c.f32(),
-    window_s: c.f32(),
+    slowest_cm_s: c.f32(),
     column_s: c.f32(),
     columns: [],
   };

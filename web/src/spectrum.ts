@@ -153,10 +153,8 @@ export class SpectrumView {
     const [from, to] = this.frozen ? [Math.min(this.cursor.from, this.cursor.to), Math.max(this.cursor.from, this.cursor.to)] : this.span();
     const columns = this.columns.filter((c) => c.number >= from && c.number <= to);
     if (columns.length < 5) return null;
-    // The spectrum of slower blood reaches into the wall filter: the window blurs it by 2 / window_s.
-    const slowest = (2 * this.axes.limit_cm_s * ((this.controls?.gate_filter_hz ?? 0) + 2 / this.axes.window_s)) / this.axes.pulse_hz;
     const squeeze = this.squeezes.find((n) => n > from && n < to);
-    return read(columns, this.axes.column_s, 1 / this.cosine, slowest, squeeze === undefined ? -1 : columns.findIndex((c) => c.number >= squeeze));
+    return read(columns, this.axes.column_s, 1 / this.cosine, this.axes.slowest_cm_s, squeeze === undefined ? -1 : columns.findIndex((c) => c.number >= squeeze));
   }
 
   // ---- drawing

@@ -84,7 +84,7 @@ static void put_spectrum(bytes_cursor *out, const sonde_gate_spectrum *heard) {
   bytes_f32(out, heard->limit_m_s * cm_s);
   bytes_f32(out, heard->low_m_s * cm_s);
   bytes_f32(out, heard->pulse_hz);
-  bytes_f32(out, heard->window_s);
+  bytes_f32(out, heard->slowest_m_s * cm_s);
   bytes_f32(out, SONDE_GATE_COLUMN_S);
   bytes_u64(out, heard->count > 0 ? heard->column[0].number : 0);
   for (uint32_t n = 0; n < heard->count; ++n) {

@@ -240,12 +240,15 @@ sonde_gate_spectrum sonde_gate_axes(const sonde_gate *g) {
   if (!g->put) return (sonde_gate_spectrum){.on = false};
   const double limit_m_s = doppler_limit(g->frequency_hz, g->pulse_hz);
   const double shift = round(g->settings.baseline * (BINS / 2)) - BINS / 2 - 0.5;
+  const double window_s = spectrum_window(g->pulse_hz) / g->pulse_hz;
   return (sonde_gate_spectrum){.on = true,
                                .settings = g->settings,
                                .pulse_hz = g->pulse_hz,
-                               .window_s = spectrum_window(g->pulse_hz) / g->pulse_hz,
+                               .window_s = window_s,
                                .limit_m_s = limit_m_s,
-                               .low_m_s = limit_m_s * shift / (BINS / 2)};
+                               .low_m_s = limit_m_s * shift / (BINS / 2),
+                               .slowest_m_s = sonde_doppler_slowest(
+                                   limit_m_s, g->settings.filter_hz, window_s, g->pulse_hz)};
 }
 
 double sonde_gate_truth(const sonde_gate *g, const sonde_flow_scene *scene,
