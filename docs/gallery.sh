@@ -18,7 +18,8 @@ shoot() {
   "$sonde" image "$of" --size 320x320 -o "$out/gallery_$name.png" "$@"
 }
 
-for state in healthy acute:acute_occlusive chronic:chronic_occlusive; do
+for state in healthy acute:acute_occlusive chronic:chronic_occlusive floating:free_floating \
+  recanalised; do
   set -- "$model" --site 27 --depth-mm 50 --case "${state#*:}"
   shoot "${state%:*}_rest" "$@" --force-n 0.5
   shoot "${state%:*}_pressed" "$@" --force-n 7
