@@ -141,6 +141,7 @@ static void a_spectrum_stands_behind_all(void **state) {
                                 .pulse_hz = 2500,
                                 .limit_m_s = 0.5,
                                 .low_m_s = -0.25,
+                                .slowest_m_s = 0.0125,
                                 .count = 2,
                                 .column = column};
   for (int colour = 0; colour < 2; ++colour) {
@@ -155,6 +156,7 @@ static void a_spectrum_stands_behind_all(void **state) {
     assert_float_equal(f32_at(b + at + 28), 50, 0);         // limit, lowest, cm/s
     assert_float_equal(f32_at(b + at + 32), -25, 0);        //
     assert_float_equal(f32_at(b + at + 36), 2500, 0);       // pulses, Hz
+    assert_float_equal(f32_at(b + at + 40), 1.25, 1e-6);    // slowest, cm/s
     assert_int_equal(u32_at(b + at + 48), 0x0a0b0c);
     assert_float_equal(f32_at(b + at + 56), 12.5, 0);
     assert_float_equal(f32_at(b + at + 60), -25, 0);
