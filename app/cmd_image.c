@@ -73,9 +73,7 @@ static const app_option TABLE[] = {
         radius_m, "curved-mm", "R", 20, 1000, 1e-3,
         "radius of a curved face, whose arc, the array's width over this radius, spans at most "
         "100 degrees; default flat"),
-    OPT_TEXT(pathology, "case", "NAME",
-             "state of the vein: healthy, partial_mural, free_floating, acute_occlusive, "
-             "subacute_occlusive, chronic_occlusive or recanalised"),
+    OPT_TEXT(pathology, "case", "NAME", "state of the vein: " APP_CASES),
     OPT_CALL(read_clot, "clot", "BRANCH:CASE",
              "the same for a branch of the model, such as great_saphenous"),
     OPT_CALL(read_lesion, "lesion", "KIND:X:DEPTH:WIDTH:HEIGHT",

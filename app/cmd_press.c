@@ -43,9 +43,7 @@ static const app_option TABLE[] = {
     OPT_REAL(cuff_pa, "cuff-mmhg", "P", 0, 300, SONDE_PA_PER_MMHG,
              "no probe: a cuff around the leg presses P on every vessel; also finds the pressure "
              "that closes the vein to 5 % of its area at rest"),
-    OPT_TEXT(pathology, "case", "NAME",
-             "healthy, partial_mural, free_floating, acute_occlusive, subacute_occlusive, "
-             "chronic_occlusive or recanalised"),
+    OPT_TEXT(pathology, "case", "NAME", APP_CASES),
     OPT_REAL(vein_depth_m, "vein-depth-mm", "D", 8, 50, 1e-3,
              "put the vein D below the site along its whole course, the artery 11 mm beside it"),
     OPT_REAL(venous_pa, "venous-mmhg", "P", 0, 80, SONDE_PA_PER_MMHG,

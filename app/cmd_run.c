@@ -48,9 +48,7 @@ static const app_option TABLE[] = {
              "record the inputs for sonde-replay(1); a FILE that is there before becomes FILE.old"),
     OPT_TEXT(probe, "probe", "NAME|FILE",
              "point, linear, square, sphere, or a mesh file in millimetres"),
-    OPT_TEXT(pathology, "case", "NAME",
-             "healthy, partial_mural, free_floating, acute_occlusive, subacute_occlusive, "
-             "chronic_occlusive or recanalised"),
+    OPT_TEXT(pathology, "case", "NAME", APP_CASES),
     OPT_TEXT(preset, "preset", "FILE", "damping, stiffness and friction, see sonde-identify(1)"),
     OPT_TEXT(compare, "compare", "FILE",
              "a second preset, which the controls of the page can change over to"),

@@ -4,6 +4,11 @@
 
 #include "app.h"
 
+// States of a vein, for the help of those options that name one.
+#define APP_CASES                                                                                  \
+  "healthy, partial_mural, free_floating, acute_occlusive, subacute_occlusive, chronic_occlusive " \
+  "or recanalised"
+
 typedef enum app_option_kind {
   OPTION_FLAG,     // bool; no value
   OPTION_TEXT,     // const char *

@@ -28,7 +28,7 @@ static double clot_scale(const piece *p, uint32_t i) {
     const double a = (n % SIDE + 0.5) / SIDE * 2 - 1, b = (n / SIDE + 0.5) / SIDE * 2 - 1;
     const double speed = fmax(1 - a * a - b * b, 0);
     all += speed;
-    free += sonde_clot_depth(form, solid, p->vessel, along_m, a, b) > 0 ? 0 : speed;
+    free += sonde_clot_holds(form, solid, p->vessel, along_m, a, b) ? 0 : speed;
   }
   return free > 0 ? (1 - solid) * all / free : 1;
 }
@@ -54,7 +54,7 @@ static bool blood_at(const piece *p, sonde_vec3 drawn, scene_blood *blood) {
   const sonde_vessel_section *low = &s->interior->section[p->vessel][p->i];
   const double along_m = low->along_m + share * (low[1].along_m - low->along_m);
   const sonde_clot_form form = s->interior->pathology[p->vessel].form;
-  if (solid > 0 && sonde_clot_depth(form, solid, p->vessel, along_m, a, b) > 0) return false;
+  if (sonde_clot_holds(form, solid, p->vessel, along_m, a, b)) return false;
   const scene_section *section = &s->section[p->vessel][p->i];
   const bool artery = s->interior->course[p->vessel].kind == SONDE_VESSEL_ARTERY;
   // The profile of the segment's main vein or the arteries, scaled to the section's mean velocity;

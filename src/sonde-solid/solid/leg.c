@@ -177,8 +177,7 @@ bool sonde_solid_leg_build(sonde_solid_leg *leg) {
   atomic_store_explicit(&leg->built, wanted, memory_order_release);
   for (; made && leg->spares < 2; ++leg->spares) {
     sonde_numeric *spare = &leg->spare[leg->spares];
-    spare->single = true;
-    if (sonde_numeric_reserve(spare, made->live->e->symbolic, NULL)) {
+    if (sonde_live_reserve(spare, made->live->e->symbolic, NULL)) {
       sonde_numeric_clear(spare);
       break;
     }

@@ -92,7 +92,7 @@ static sonde_status reserve(sonde_solid_live *l, sonde_numeric *spare, sonde_err
   sonde_status status = SONDE_OK;
   for (int k = 0; k < 2 && !status; ++k) {
     if (spare) l->bulk[k] = spare[k], spare[k] = (sonde_numeric){0};
-    l->bulk[k].single = true, status = sonde_numeric_reserve(&l->bulk[k], e->symbolic, error);
+    status = sonde_live_reserve(&l->bulk[k], e->symbolic, error);
   }
   l->e->numeric.kernels = l->bulk[0].kernels; // its only part that a live solid uses
   return status;

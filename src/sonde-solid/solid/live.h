@@ -93,6 +93,13 @@ static inline size_t sonde_live_side(const sonde_solid_live *l) { // of patch an
   return 3 * (size_t)(l->e->patch_count + l->e->zone_count);
 }
 
+// Room for a factor of the bulk, and for those of the places that follow, which differ by a little.
+static inline sonde_status sonde_live_reserve(sonde_numeric *bulk, const sonde_symbolic *symbolic,
+                                              sonde_error *error) {
+  bulk->single = true, bulk->slack = 0.125;
+  return sonde_numeric_reserve(bulk, symbolic, error);
+}
+
 // As sonde_solid_live_create(), with the memory of two factors that another live solid has left,
 // which is taken; NULL: none.
 sonde_status sonde_live_make(const sonde_hexes *mesh, const sonde_probe *probe, sonde_pose start,

@@ -33,7 +33,7 @@ static const double sonde_segment_m = 2e-3; // along the leg's axis
 static inline bool sonde_blood_in_clot(const blood_segment *s, float x, float y, float z) {
   double along_m = (s->segment + 0.5 + (double)z) * sonde_segment_m;
   const double a = 2 * (double)x, b = 2 * (double)y;
-  return s->solid > 0 && sonde_clot_depth(s->form, s->solid, s->vessel, along_m, a, b) > 0;
+  return sonde_clot_holds(s->form, s->solid, s->vessel, along_m, a, b);
 }
 
 // What waits, per band in the order in which it came; ends are negative.

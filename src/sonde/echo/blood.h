@@ -1,10 +1,10 @@
-// How far the blood of a vessel has flowed.
+// Blood of the vessels in view.
 #ifndef SONDE_SRC_ECHO_BLOOD_H
 #define SONDE_SRC_ECHO_BLOOD_H
 
 #include "echo/echo.h"
 
-// A vessel's blood at the time of the flow.
-sonde_vessel_blood sonde_blood_of(const sonde_echo *echo, uint32_t which);
+// How the blood of each vessel in view moves, once a frame: echo->moves.
+void sonde_blood_find(sonde_echo *echo);
 
 #endif

@@ -73,15 +73,21 @@ static double path_of(const sonde_echo *echo, uint32_t which, double t_s) {
   return -distal * flow->vein_m_s * t_s;
 }
 
-sonde_vessel_blood sonde_blood_of(const sonde_echo *echo, uint32_t which) {
-  SONDE_ASSERT(which < echo->interior->vessel_count);
-  if (echo->flow.blood) return echo->flow.blood[which];
+void sonde_blood_find(sonde_echo *echo) {
   const double half_s = 5e-3, t = echo->flow.t_s;
-  return (sonde_vessel_blood){
-      .path_m = path_of(echo, which, t),
-      .speed_m_s =
-          (path_of(echo, which, t + half_s) - path_of(echo, which, t - half_s)) / (2 * half_s),
-      .shut = 0.5};
+  for (uint32_t shown = 0; shown < echo->shown_count; ++shown) {
+    const uint32_t which = echo->shown[shown];
+    SONDE_ASSERT(which < echo->interior->vessel_count);
+    if (echo->flow.blood) {
+      echo->moves[shown] = echo->flow.blood[which];
+      continue;
+    }
+    const double before_m = path_of(echo, which, t - half_s),
+                 after_m = path_of(echo, which, t + half_s);
+    echo->moves[shown] = (sonde_vessel_blood){.path_m = path_of(echo, which, t),
+                                              .speed_m_s = (after_m - before_m) / (2 * half_s),
+                                              .shut = 0.5};
+  }
 }
 
 void sonde_echo_blood(sonde_echo *echo) {
@@ -92,7 +98,7 @@ void sonde_echo_blood(sonde_echo *echo) {
   for (uint32_t shown = 0; shown < echo->shown_count; ++shown) {
     const uint32_t which = echo->shown[shown], sections = in->course[which].count;
     if (sections < 2) continue;
-    const sonde_vessel_blood moves = sonde_blood_of(echo, which);
+    const sonde_vessel_blood moves = echo->moves[shown];
     const float brighter = amplitude_of_db((float)(most_rouleaux_db * moves.rouleaux));
     const int32_t first = (int32_t)ceil(in->section[which][0].along_m / sonde_segment_m);
     const int32_t last = (int32_t)floor(in->section[which][sections - 1].along_m / sonde_segment_m);

@@ -115,7 +115,8 @@ struct sonde_echo {
   bool vessels;                 // any
   uint32_t shown[MOST_VESSELS]; // vessels in view: the femoral ones, then branches
   uint32_t shown_count;
-  uint32_t lesion[MOST_LESIONS]; // lesions in view
+  sonde_vessel_blood moves[MOST_VESSELS]; // of those shown (blood_hot.c)
+  uint32_t lesion[MOST_LESIONS];          // lesions in view
   uint32_t lesion_count;
   uint32_t cell[MOST_CELLS]; // seeds in view, of a model with a tissue map
   uint32_t cell_count;

@@ -2,6 +2,7 @@
 #include "base/base.h"
 #include "base/clock.h"
 #include "echo/bands.h"
+#include "echo/blood.h"
 #include "echo/cubes.h"
 #include "echo/lines.h"
 
@@ -185,6 +186,7 @@ void sonde_echo_render(sonde_echo *echo, sonde_pose world_from_probe, double ape
   sonde_echo_frame(echo, world_from_probe, aperture_m, settings);
   t->settings_s = lap(&now);
   sonde_echo_plane(echo);
+  sonde_blood_find(echo);
   t->plane_s = lap(&now);
   sonde_echo_medium(echo);
   sonde_echo_ghosts(echo);

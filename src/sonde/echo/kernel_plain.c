@@ -29,8 +29,7 @@ static void splat(const splat_job *job) {
         const splat_lumen *l = &job->lumen[k];
         double a = form_at(l->along, x, y, z), b = form_at(l->across, x, y, z);
         const double along_m = form_at(l->axial, x, y, z), solid = (double)l->solid;
-        if (a * a + b * b < 1 &&
-            !(solid > 0 && sonde_clot_depth(l->form, solid, l->vessel, along_m, a, b) > 0))
+        if (a * a + b * b < 1 && !sonde_clot_holds(l->form, solid, l->vessel, along_m, a, b))
           shown = (double)l->amplitude;
       }
       const double weight = (double)job->sign[i] * (double)map->m[0][3] * shown * height;

@@ -3,7 +3,6 @@
 // docs/echo.md.
 #include "base/base.h"
 #include "base/random.h"
-#include "echo/blood.h"
 #include "echo/gates.h"
 #include "echo/sound.h"
 #include "sonde/tissue_anatomy.h"
@@ -326,7 +325,7 @@ static void describe_tissue(sonde_echo *echo, tissue_job *job) {
         .layers_db = 2.5f + 5.5f * age,
         .number = which,
         .form = p->form,
-        .cusp_bend = (float)sonde_blood_of(echo, which).shut};
+        .cusp_bend = (float)echo->moves[k].shut};
   }
   for (uint32_t k = 0; k < job->lesions; ++k) {
     const sonde_lesion *l = &in->findings.lesion[echo->lesion[k]];

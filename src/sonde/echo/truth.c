@@ -3,7 +3,6 @@
 #include "echo/truth.h"
 
 #include "base/base.h"
-#include "echo/blood.h"
 #include "echo/sound.h"
 #include "interior/clot.h"
 #include "interior/vessels.h"
@@ -77,11 +76,11 @@ bool sonde_truth_at(const sonde_echo *echo, const sonde_image *image, uint32_t c
     pixel->label = here ? SONDE_LABEL_ARTERY : SONDE_LABEL_VEIN;
     const double solid = sonde_echo_solid(echo, number, v.rest_centre_m.z);
     const sonde_clot_form form = sonde_echo_pathology(echo, number)->form;
-    if (solid > 0 && (solid >= 1 || sonde_clot_depth(form, solid, number, along_m, a, b) > 0)) {
+    if (sonde_clot_holds(form, solid, number, along_m, a, b)) {
       pixel->label = SONDE_LABEL_THROMBUS;
       return true;
     }
-    const double speed = sonde_blood_of(echo, number).speed_m_s * 2 * (1 - a * a - b * b);
+    const double speed = echo->moves[k].speed_m_s * 2 * (1 - a * a - b * b);
     pixel->velocity_m_s = v_scale(v.axis, solid < 1 ? speed : 0);
     return true;
   }

@@ -66,4 +66,11 @@ static inline double sonde_clot_depth(sonde_clot_form form, double solid, uint32
               hypot(a + opposite * c, b + opposite * s) - other);
 }
 
+// Whether clot holds a place of the lumen, of a clot whose share may be anything from 0 to 1.
+static inline bool sonde_clot_holds(sonde_clot_form form, double solid, uint32_t vessel,
+                                    double along_m, double a, double b) {
+  if (!(solid > 0) || solid >= 1) return solid >= 1;
+  return sonde_clot_depth(form, solid, vessel, along_m, a, b) > 0;
+}
+
 #endif

@@ -274,12 +274,11 @@ sonde_label sonde_vessels_label(const sonde_interior *in, sonde_vec3 rest, doubl
     if (artery) return SONDE_LABEL_ARTERY;
     const sonde_pathology *p = &in->pathology[which];
     if (!sonde_pathology_clot(p, rest.z)) return SONDE_LABEL_VEIN;
-    if (p->thrombus_fraction >= 1) return SONDE_LABEL_THROMBUS;
     double deep = -v_dot(d, v.flat_axis) / v.rest_radius_m;
     double across = v_dot(d, v_cross(v.axis, v.flat_axis)) / v.rest_radius_m;
-    const double inside =
-        sonde_clot_depth(p->form, p->thrombus_fraction, which, along, -deep, across);
-    return inside > 0 ? SONDE_LABEL_THROMBUS : SONDE_LABEL_VEIN;
+    return sonde_clot_holds(p->form, p->thrombus_fraction, which, along, -deep, across)
+               ? SONDE_LABEL_THROMBUS
+               : SONDE_LABEL_VEIN;
   }
   return wall;
 }

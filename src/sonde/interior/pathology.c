@@ -72,8 +72,13 @@ sonde_status sonde_pathology_preset(const char *name, sonde_pathology *pathology
     pathology->arterial_pressure_pa = ARTERIAL_MMHG * SONDE_PA_PER_MMHG;
     return SONDE_OK;
   }
-  return sonde_fail(error, SONDE_NOT_FOUND,
-                    "unknown case '%s'; expected healthy, partial_mural, free_floating, "
-                    "acute_occlusive, subacute_occlusive, chronic_occlusive or recanalised",
-                    name != NULL ? name : "");
+  char known[160] = "";
+  for (size_t k = 0, used = 0; names[k] != NULL; ++k)
+    used += (size_t)snprintf(known + used, sizeof known - used, "%s%s",
+                             k == 0                 ? ""
+                             : names[k + 1] == NULL ? " or "
+                                                    : ", ",
+                             names[k]);
+  return sonde_fail(error, SONDE_NOT_FOUND, "unknown case '%s'; expected %s",
+                    name != NULL ? name : "", known);
 }

@@ -189,8 +189,7 @@ sonde_status sonde_numeric_reserve(sonde_numeric *f, const sonde_symbolic *s, so
   if (!f->kernels) f->kernels = sonde_dense_kernels_find(NULL);
   for (size_t k = 0; k < SONDE_COUNT_OF(parts); ++k) {
     if (*parts[k].array && *parts[k].room >= parts[k].wanted) continue;
-    // Single precision is for solids that follow each other and differ by a little.
-    const size_t room = parts[k].wanted + (f->single ? parts[k].wanted / 8 : 0);
+    const size_t room = parts[k].wanted + (size_t)(f->slack * (double)parts[k].wanted);
     sonde_free(*parts[k].array);
     *parts[k].array = sonde_calloc(room, parts[k].size);
     *parts[k].room = *parts[k].array ? room : 0;

@@ -62,11 +62,12 @@ typedef struct sonde_numeric {
   const sonde_symbolic *symbolic; // of the matrix that is being factored
   sonde_matrix_source source;
   const sonde_dense_kernels *kernels; // the widest; tests choose others
-  float *factor;          // per piece, in rows of sonde_front_width(own): see sonde_dense_kernels
-  bool single;            // of fronts, set before room is made: double precision or single
-  void *front;            // working front, the condensed matrix at the end; double or float
-  void *stack;            // updates that wait for their parent
-  uint32_t *local;        // [node_count] place -> index in the working front
+  float *factor;   // per piece, in rows of sonde_front_width(own): see sonde_dense_kernels
+  bool single;     // of fronts, set before room is made: double precision or single
+  double slack;    // likewise: share of all room made beyond what is wanted, for analyses to come
+  void *front;     // working front, the condensed matrix at the end; double or float
+  void *stack;     // updates that wait for their parent
+  uint32_t *local; // [node_count] place -> index in the working front
   float *part, *gathered; // unknowns of a piece and its boundary, all unknowns in their order
   size_t factor_room, front_room, stack_room, local_room, gathered_room, part_room;
   size_t top;           // of the stack
