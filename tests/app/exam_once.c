@@ -190,6 +190,7 @@ static int run(void) {
   exam_app *app = NULL;
   sonde_session_def practice = sonde_session_def_default();
   practice.image_width = practice.image_height = 128;
+  practice.ticks_per_image = 100; // images are a third of an exam's work, few are looked at
   if (sonde_model_load(setting("EXAM_ONCE_MODEL"), &model, &error)) return app_fail("run", &error);
   exam_app_def def = {.model = model,
                       .model_path = setting("EXAM_ONCE_MODEL"),

@@ -114,6 +114,12 @@ static inline int stop_server(void **state) {
   return 0;
 }
 
+static inline void set_patience(fixture *f, page_patience patience) {
+  pthread_mutex_lock(&f->server->lock);
+  f->server->patience = patience;
+  pthread_mutex_unlock(&f->server->lock);
+}
+
 static inline void wait_for_clients(fixture *f, uint32_t count) {
   double end_s = sonde_clock_now() + PATIENCE_S;
   while (page_server_clients(f->server) != count && sonde_clock_now() < end_s) usleep(2000);

@@ -164,12 +164,6 @@ static void the_hash_gives_the_published_values(void **state) {
 // ---- connections that cost others nothing
 // --------------------------------------------------------
 
-static void set_patience(fixture *f, page_patience patience) {
-  pthread_mutex_lock(&f->server->lock);
-  f->server->patience = patience;
-  pthread_mutex_unlock(&f->server->lock);
-}
-
 // No request has to end before the page is served: 40 that are half sent are still open after it.
 static void half_open_requests_delay_nobody(void **state) {
   fixture *f = *state;
