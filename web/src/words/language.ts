@@ -84,8 +84,11 @@ export function counted(key: Counted, n: number, values: Record<string, string |
   return put(words[`${key}.${rules.select(n) === "one" ? "one" : "other"}` as Key], { n, ...values });
 }
 
-/** A name within a sentence: small letters where the language allows it. */
-export const amid = (name: string): string => (language === "de" ? name : name.toLowerCase());
+/** Surnames that vessels are called by: capital within a sentence too. */
+const SURNAME = /^(Boyd|Cockett|Dodd|Hunter)\b/;
+
+/** A name within a sentence: a small first letter where the language allows it. */
+export const amid = (name: string): string => (language === "de" || SURNAME.test(name) ? name : name.charAt(0).toLowerCase() + name.slice(1));
 
 export const capital = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
 
