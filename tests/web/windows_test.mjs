@@ -71,6 +71,8 @@ async function testSize(browser, mock, size) {
   await look(page, "start", size);
   await button(page, "Free practice").click();
   await look(page, "practice", size);
+  const leg = await page.evaluate(() => window.sonde.legOnScreen());
+  check(leg.least > 0 && leg.most < 1 && leg.most - leg.least > 0.6, `practice at ${size.join(" x ")}: all of the leg is in its picture and fills it, from ${leg.least.toFixed(2)} to ${leg.most.toFixed(2)}`);
   await reachable(page, "practice", size);
   await button(page, "Compare").click();
   await look(page, "compare", size);

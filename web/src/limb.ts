@@ -59,6 +59,11 @@ export class Foot {
     if (limb) this.group.add(new THREE.Mesh(footGeometry(limb), this.material));
   }
 
+  /** Where its skin is, mm. */
+  points(): ArrayLike<number> {
+    return (this.group.children[0] as THREE.Mesh | undefined)?.geometry.getAttribute("position").array ?? [];
+  }
+
   /** Like the skin above it. */
   seeThrough(on: boolean): void {
     this.material.opacity = on ? 0.35 : 1;

@@ -729,6 +729,7 @@ const sonde = {
   get point() { return app.hold.point; },
   get draft() { return app.editor.told; },
   vesselOnScreen: (part: number, share: number) => app.scene.vesselOnScreen(part, share),
+  legOnScreen: () => app.scene.legOnScreen(),
   /** middle of the wanted ring on the canvas, px */
   targetOnScreen: () => app.scene.targetOnScreen("middle"),
   setDepth: (depth_mm: number) => app.setDepth(depth_mm),

@@ -7,6 +7,7 @@ import { creased } from "./creased";
 import { find } from "./dom";
 import { nextRange, SHADES, SHADE_TABLE } from "./colour";
 import { FlatView, movedShare, type FlatVessel } from "./flat";
+import { halfView, stand } from "./framing";
 import { nearestShare, stretch } from "./vessels";
 import { Gel } from "./gel";
 import { Foot } from "./limb";
@@ -21,14 +22,12 @@ const LOW_INTERVAL_S = 1 / 8;
 const LOW_STILL_INTERVAL_S = 1;
 const STILL_MM = 0.05; // movements below this one are not seen
 const STILL_COSINE = Math.cos(0.0005); // of half the angle that the probe turned by
-const FOV_DEG = 27;
-const WIDE = 1.3; // width over height in which the whole leg is seen
 const CALM_ALPHA = 0.4; // of see-through skin at rest; displaced skin is up to MOVED_ALPHA
 const MOVED_ALPHA = 0.86;
 const CREASE_RAD = 0.6; // sharper edges are drawn sharp
 const SEEN_COSINE = 0.4; // between the view and the normal of a place: less is on the far side
-const MIDDLE_SHARE = 0.46, AWAY_SHARE = 1.9; // of the leg's length: what the camera looks at, and from how far
-const FARTHEST_MM = 2000; // of the camera from the leg
+const NEAREST_MM = 220, FARTHEST_SHARE = 1.6; // of the camera from the leg; of the distance at which all of it is seen
+const OTHER_SHARE = 0.3; // a leg whose length differs by more is looked at anew
 const MARK_SCALE = 1.35; // of a marked stretch against its vessel
 const BEHIND_MM = 46; // how much of a probe's body is drawn: a hand's breadth, not the whole handle
 
@@ -113,7 +112,7 @@ export class LegScene {
   readonly orbit: OrbitControls;
   private renderer: THREE.WebGLRenderer | null = null;
   private readonly scene = new THREE.Scene();
-  private readonly camera = new THREE.PerspectiveCamera(FOV_DEG, 1, 10, 3000);
+  private readonly camera = new THREE.PerspectiveCamera(30, 1, 10, 8000);
   private readonly skinMaterial = skinMaterial();
   private readonly inside = new THREE.Group();
   private readonly probe = new THREE.Group();
@@ -132,7 +131,7 @@ export class LegScene {
   private readonly foot = new Foot();
   private readonly lights = new THREE.Group();
   private limb: LimbInfo | null = null;
-  private readonly centre = new THREE.Vector3(12, -8, 142); // that the camera looks at
+  private outline = new Float32Array([-60, -60, 0, 84, 44, 284]); // what is to be seen: skin and foot
   private probes: readonly ProbeInfo[] = [];
   private gelled = false;
   private dotInfo: SiteDot[] = [];
@@ -151,7 +150,11 @@ export class LegScene {
   private placed: Frame | null = null; // that skin and probe were last drawn at
   private seen = ""; // side and position of the leg
   private faced = "";
-  private away_mm = 560;
+  private length_mm = 0; // of the leg
+  private fitted_mm = 560; // distance at which all of it is seen
+  private size_px: [number, number] = [600, 450]; // of the picture
+  private sided: THREE.Vector3 | null = null; // from where the newest place is seen, if not from home
+  private turned = false; // by the viewer, or brought nearer
   /** whether the thigh is drawn without WebGL from now on */
   flatChanged: (flat: boolean) => void = () => undefined;
 
@@ -214,23 +217,23 @@ export class LegScene {
     this.orbit.enableZoom = false; // the wheel presses; Ctrl + wheel zooms (input.ts)
     this.orbit.mouseButtons = { LEFT: null, MIDDLE: THREE.MOUSE.ROTATE, RIGHT: null };
     this.orbit.touches = { ONE: null, TWO: null }; // one finger beside the leg turns (input.ts)
-    this.orbit.minDistance = 220;
-    this.orbit.maxDistance = FARTHEST_MM;
+    this.orbit.minDistance = NEAREST_MM;
+    this.orbit.addEventListener("start", () => (this.turned = true));
     this.orbit.addEventListener("change", () => this.spoil());
   }
 
-  /** The middle and the length of what is to be seen; a patient of another length is looked at anew. */
+  /** What is to be seen; a patient of another length, side or position is looked at anew. */
   private look(mesh: Mesh): void {
     let low = Infinity, high = -Infinity;
     for (let i = 2; i < mesh.points.length; i += 3) (low = Math.min(low, mesh.points[i]!)), (high = Math.max(high, mesh.points[i]!));
-    const middle = low + MIDDLE_SHARE * (high - low), away = Math.min(FARTHEST_MM, AWAY_SHARE * (high - low));
     const key = this.limb ? `${this.limb.side} ${this.limb.position}` : "";
-    const other = Math.abs(away - this.away_mm) > 0.3 * this.away_mm || key !== this.seen;
-    (this.seen = key), (this.away_mm = away);
-    this.centre.set(12, -8, middle);
-    // A bent leg is not about the model's axis.
-    if (this.limb) new THREE.Box3().setFromArray(mesh.points).getCenter(this.centre);
+    const other = Math.abs(high - low - this.length_mm) > OTHER_SHARE * this.length_mm || key !== this.seen;
+    const foot = this.foot.points();
+    this.outline = new Float32Array(mesh.points.length + foot.length);
+    this.outline.set(mesh.points), this.outline.set(foot, mesh.points.length);
+    (this.seen = key), (this.length_mm = high - low);
     if (other) this.home();
+    else this.fit();
   }
 
   /** Side and position of a limb, before its skin comes: up is the patient's. */
@@ -249,20 +252,36 @@ export class LegScene {
     this.home();
   }
 
-  /** Medial and from above, the leg lying across the picture; a standing one seen from the front. */
   home(): void {
-    this.orbit.target.copy(this.centre);
+    this.turned = false;
+    this.sided = null;
+    this.fit();
+  }
+
+  /** Medial and from above, the leg lying across the picture, in a narrow one along it; a standing leg seen from the front. */
+  private homeward(): THREE.Vector3 {
     const medial = this.limb?.side === "left" ? -1 : 1, up = this.camera.up;
-    const away = new THREE.Vector3(0.74 * medial, 0.52 * up.y, -0.43).normalize();
-    if (Math.abs(up.z) > 0.5) away.set(0.5 * medial, 0.8, -0.25).normalize();
-    this.camera.position.copy(this.orbit.target).addScaledVector(away, this.away_mm);
+    if (Math.abs(up.z) > 0.5) return new THREE.Vector3(0.5 * medial, 0.8, -0.25);
+    return this.size_px[0] < this.size_px[1] ? new THREE.Vector3(0.42 * medial, 0.68 * up.y, -0.6) : new THREE.Vector3(0.74 * medial, 0.52 * up.y, -0.43);
+  }
+
+  /** All of the leg, from where it is to be seen; what the viewer has turned and brought nearer keeps its middle and its size. */
+  private fit(from: THREE.Vector3 | null = null): void {
+    const before = this.fitted_mm, present = this.camera.position.clone().sub(this.orbit.target), distance = present.length();
+    const away = (from ?? (this.turned ? present : (this.sided ?? this.homeward()))).clone().normalize();
+    const { target_mm, away_mm } = stand(this.outline, away.toArray(), this.camera.up.toArray(), this.size_px[0], this.size_px[1]);
+    this.fitted_mm = away_mm;
+    this.orbit.maxDistance = FARTHEST_SHARE * away_mm;
+    if (!this.turned) this.orbit.target.set(...target_mm);
+    this.camera.position.copy(this.orbit.target).addScaledVector(away, this.turned ? (distance * away_mm) / before : away_mm);
     this.orbit.update();
     this.spoil();
   }
 
   zoom(factor: number): void {
     const offset = this.camera.position.clone().sub(this.orbit.target);
-    offset.setLength(Math.min(FARTHEST_MM, Math.max(220, offset.length() * factor)));
+    offset.setLength(Math.min(this.orbit.maxDistance, Math.max(NEAREST_MM, offset.length() * factor)));
+    this.turned = true;
     this.camera.position.copy(this.orbit.target).add(offset);
     this.orbit.update();
     this.spoil();
@@ -272,11 +291,12 @@ export class LegScene {
     const { clientWidth: w, clientHeight: h } = this.canvas;
     if (w === 0 || h === 0) return;
     this.renderer?.setSize(w, h, false);
+    this.size_px = [w, h];
     this.camera.aspect = w / h;
-    const narrow = Math.max(1, WIDE / this.camera.aspect); // the leg lies across: a narrow picture looks wider
-    this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(narrow * Math.tan(THREE.MathUtils.degToRad(FOV_DEG / 2))));
+    this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(halfView(w, h).y));
     this.camera.updateProjectionMatrix();
-    this.spoil();
+    this.sides.seenOn(w, h);
+    this.fit();
   }
 
   seeThrough(on: boolean): void {
@@ -436,9 +456,8 @@ export class LegScene {
     const from = this.camera.position.clone().sub(this.orbit.target), out = new THREE.Vector3(...target.normal).normalize();
     const look = from.clone().normalize();
     if (out.dot(look) > SEEN_COSINE) return;
-    look.addScaledVector(out, 1.6 - out.dot(look)).normalize();
-    this.camera.position.copy(this.orbit.target).addScaledVector(look, from.length());
-    this.orbit.update();
+    this.sided = look.addScaledVector(out, 1.6 - out.dot(look)).normalize();
+    this.fit(this.sided);
   }
 
   /** Where the target's name belongs on the canvas, px; null when there is none or it is behind. */
@@ -595,6 +614,17 @@ export class LegScene {
     this.camera.updateMatrixWorld();
     const q = new THREE.Vector3(piece[0], piece[1], piece[2]).project(this.camera);
     return [((q.x + 1) / 2) * this.canvas.clientWidth, ((1 - q.y) / 2) * this.canvas.clientHeight];
+  }
+
+  /** How far skin and foot reach, as shares of the picture: less than 0 or more than 1 is out of it. */
+  legOnScreen(): { least: number; most: number } {
+    this.camera.updateMatrixWorld();
+    const p = new THREE.Vector3(), shares: number[] = [];
+    for (let i = 0; i < this.outline.length; i += 3) {
+      p.fromArray(this.outline, i).project(this.camera);
+      shares.push((p.x + 1) / 2, (1 - p.y) / 2);
+    }
+    return { least: shares.reduce((a, b) => Math.min(a, b)), most: shares.reduce((a, b) => Math.max(a, b)) };
   }
 
   /** Draws stretches of vessels thicker, for clots that are being placed. */

@@ -1,12 +1,13 @@
 // Names of the leg's ends and sides, in the picture of the leg.
 
 import * as THREE from "three";
+import { halfView } from "./framing";
 import type { LimbInfo } from "./protocol";
 import { ink } from "./theme";
 import { t } from "./words/language";
 
-const HEIGHT_PX = 44; // of the drawn letters; shown at a third
-const SIZE = 0.032; // of the picture's height
+const HEIGHT_PX = 44; // of the drawn letters
+const LEAST_PX = 19, SHARE = 0.034; // of a shown name, and of it in the picture's height
 const AWAY_MM = 14; // from the skin
 const END_MM = 15; // of the leg that belongs to an end
 const THIGH_MM = 500; // a longer leg goes on below the knee
@@ -29,7 +30,7 @@ function words(text: string): THREE.Sprite {
   const map = new THREE.CanvasTexture(canvas);
   map.colorSpace = THREE.SRGBColorSpace;
   const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false, sizeAttenuation: false }));
-  sprite.scale.set((SIZE * canvas.width) / canvas.height, SIZE, 1);
+  sprite.userData.wide = canvas.width / canvas.height;
   sprite.renderOrder = 6;
   sprite.name = text;
   return sprite;
@@ -48,6 +49,13 @@ export class Sides {
   limb: LimbInfo | null = null; // whose side is known
   private middle_x = 0;
   private half_x = 0;
+  private high = 0.03; // a name at a distance of one
+
+  /** Names keep a size that can be read when the picture is small, and can be read from afar when it is large. */
+  seenOn(width_px: number, height_px: number): void {
+    this.high = (Math.max(LEAST_PX, SHARE * height_px) / height_px) * 2 * halfView(width_px, height_px).y;
+    for (const sprite of this.group.children) sprite.scale.set(this.high * (sprite.userData.wide as number), this.high, 1);
+  }
 
   /** Around a leg with these skin points, mm; a right one until its vein is known. */
   place(points: Float32Array): void {
@@ -69,6 +77,7 @@ export class Sides {
       const sprite = words(text);
       sprite.position.set(x, y, z);
       sprite.userData.side = side;
+      sprite.scale.set(this.high * (sprite.userData.wide as number), this.high, 1);
       this.group.add(sprite);
     }
     this.middle_x = middle.x;
