@@ -47,6 +47,24 @@ static sonde_status show_leg(exam_app *app, const sonde_case *of, sonde_case_set
   return SONDE_OK;
 }
 
+// Calls the main vein's segments, those that the case names, and those that it would call otherwise
+// unless they were named, what their veins are.
+static void follow_findings(sonde_case *of, const sonde_case_setup *leg) {
+  const sonde_case before = *of;
+  of->truth_count = 0;
+  of->thrombosis = leg->thrombosis;
+  for (uint32_t i = 0; i < leg->map.segment_count; ++i) {
+    const sonde_exam_segment *segment = &leg->map.segment[i];
+    const sonde_decision is = leg->clot[i] ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
+    bool named = sonde_case_truth(of, segment->name) != is;
+    for (uint32_t k = 0; k < before.truth_count; ++k)
+      named |= strcmp(before.truth_segment[k], segment->name) == 0;
+    if (!named) continue;
+    memcpy(of->truth_segment[of->truth_count], segment->name, sizeof segment->name);
+    of->truth[of->truth_count++] = is;
+  }
+}
+
 sonde_status exam_draft_check(exam_app *app, const char *text, sonde_case *out,
                               sonde_error *error) {
   assert(app->draft && text);
@@ -57,14 +75,22 @@ sonde_status exam_draft_check(exam_app *app, const char *text, sonde_case *out,
         app_error(error, SONDE_ARGUMENT,
                   "the page edits no case with a model file: give a leg, or a thigh by its seed");
   if (status) return status;
-  if (app->draft->right && strcmp(app->draft->right, text) == 0) return SONDE_OK;
-  free(app->draft->right);
-  app->draft->right = NULL;
+  exam_draft *draft = app->draft;
+  if (draft->right && draft->right_follows == draft->follows && strcmp(draft->right, text) == 0) {
+    *out = draft->told;
+    return SONDE_OK;
+  }
+  free(draft->right);
+  draft->right = NULL;
   exam_app_set_phase(app, EXAM_PREPARING, "The leg of the case is being made.");
-  status = sonde_case_build(out, exam_app_bundled(app), app->own_cases, &leg, error);
+  sonde_case untold = *out;
+  if (draft->follows) untold.truth_count = 0;
+  status = sonde_case_build(&untold, exam_app_bundled(app), app->own_cases, &leg, error);
+  if (!status && draft->follows) follow_findings(out, &leg);
   if (!status) status = show_leg(app, out, &leg, error);
   if (!status) {
-    app->draft->right = strdup(text);
+    draft->told = *out, draft->right_follows = draft->follows;
+    draft->right = strdup(text);
     return SONDE_OK;
   }
   // Nothing was built; but where a clot or the truth is wrong is best seen on the leg.

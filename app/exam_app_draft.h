@@ -13,8 +13,11 @@ struct exam_draft {
   uint32_t serial;        // of the message that is answered
   bool good, exists;      // it can be examined; another of its id would be replaced
   char message[512], saved[EXAM_PATH];
-  char *text;  // of the case that was opened, freed by sonde_free(); NULL: the page has it
-  char *right; // text of the case in view, that was found to be right; free()
+  bool follows;       // the answer is what the findings come to
+  sonde_case told;    // the case that was found to be right, with its answer
+  char *text;         // of the case that was opened, freed by sonde_free(); NULL: the page has it
+  char *right;        // text of `told`; free(). NULL: none
+  bool right_follows; // `told` has the answer of its findings, whatever its text says
 };
 
 // exam_app_edit.c: the case editor.
@@ -25,8 +28,8 @@ sonde_status exam_edit(exam_app *app, const char *entry, sonde_error *error);
 // Reads those that ship and the user's own again. Of the user's own those that cannot be read are
 // left out with a sentence on stderr.
 sonde_status exam_app_load_cases(exam_app *app, sonde_error *error);
-// Reads the text and builds the case. A leg whose findings or truth are wrong is shown
-// nevertheless.
+// Reads the text and builds the case; when the draft's answer follows, it is that of the findings.
+// A leg whose findings or truth are wrong is shown nevertheless.
 sonde_status exam_draft_check(exam_app *app, const char *text, sonde_case *out, sonde_error *error);
 // Writes it among the user's own cases, under its id, which the reader has found to be a plain
 // name.

@@ -35,6 +35,8 @@ sonde_status exam_edit(exam_app *app, const char *entry, sonde_error *error) {
   const double serial = sonde_json_as_number(sonde_json_member(root, "serial"));
   draft->serial = serial >= 0 && serial < 1e9 ? (uint32_t)serial : 0;
   draft->saved[0] = 0, draft->exists = false;
+  const sonde_json *follows = sonde_json_member(root, "follows");
+  draft->follows = sonde_json_kind_of(follows) == SONDE_JSON_TRUE;
   sonde_free(draft->text);
   draft->text = NULL;
   if (before == EXAM_RUNNING) {

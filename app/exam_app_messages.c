@@ -376,6 +376,16 @@ void exam_app_tell_draft(exam_app *app) {
   sonde_json_put_text(&out, "message", draft->message);
   sonde_json_put_text(&out, "saved", draft->saved);
   if (draft->text) sonde_json_put_text(&out, "text", draft->text);
+  if (draft->good && draft->follows) { // what the findings come to
+    sonde_json_begin_object(&out, "answer");
+    sonde_json_put_bool(&out, "thrombosis", draft->told.thrombosis);
+    sonde_json_begin_object(&out, "segments");
+    for (uint32_t k = 0; k < draft->told.truth_count; ++k)
+      sonde_json_put_text(&out, draft->told.truth_segment[k],
+                          sonde_decision_name(draft->told.truth[k]));
+    sonde_json_end(&out);
+    sonde_json_end(&out);
+  }
   uint32_t count;
   const sonde_parameter *p = sonde_limb_parameters(&count);
   sonde_json_begin_list(&out, "parameters");

@@ -19,9 +19,12 @@ typedef struct sonde_case_setup {
   sonde_pathology pathology;
   sonde_findings findings;
   sonde_circulation circulation;
+  bool clot[SONDE_SEGMENTS]; /**< [map.segment_count] one of its veins holds one of 5 mm or more */
+  bool thrombosis;           /**< of a deep vein */
 } sonde_case_setup;
 
-/** Loads or makes the thigh, places everything on it and checks the truth against it.
+/** Loads or makes the thigh, places everything on it, finds which segments hold a clot and checks
+ *  the truth against that. A case without a truth (truth_count 0) is built too.
  *  @param bundled path of the bundled model; may be NULL when the case does not use it
  *  @param directory of the case file, for model paths; NULL: the working directory
  *  @param[out] setup released by sonde_case_setup_clear()

@@ -162,6 +162,10 @@ static void mistakes_are_named_with_their_line(void **state) {
       {"thrombosis: true", "thrombosis: false", "a segment is clot", 15},
       {"femoral_mid: clot", "femoral_mid: open", "compressible, clot", 17},
       {"femoral_mid: clot", "femoral_middle: clot", "unknown key", 17},
+      {"  segments: {common_femoral: compressible, femoral_proximal: compressible, femoral_mid: "
+       "clot, "
+       "femoral_distal: compressible, popliteal: compressible}\n",
+       "", "the truth has no segments", 15},
       {"title: One", "title: [", "not YAML", 5},
   };
   for (size_t i = 0; i < SONDE_COUNT_OF(MISTAKE); ++i) {
@@ -213,6 +217,37 @@ static void the_truth_must_fit(void **state) {
   bad.truth_count = 4;
   assert_int_equal(build(&bad, &setup, &error), SONDE_MISMATCH);
   assert_non_null(strstr(error.message, "misses"));
+  // Without a truth there is nothing to deny: the findings give it.
+  sonde_exam_protocol *ways;
+  sonde_exam_setups setups;
+  sonde_plan plan;
+  uint32_t count;
+  bad = c;
+  bad.truth_count = 0, bad.thrombosis = false;
+  if (build(&bad, &setup, &error)) fail_msg("%s", error.message);
+  assert_true(setup.thrombosis);
+  for (uint32_t i = 0; i < setup.map.segment_count; ++i)
+    assert_int_equal(setup.clot[i], strcmp(setup.map.segment[i].name, "femoral_mid") == 0);
+  sonde_case_setup_clear(&setup);
+  bad.pathology.thrombus_fraction = 0;
+  bad.branch_count = 1;
+  bad.branch[0] =
+      (sonde_case_branch){.branch = "great_saphenous",
+                          .pathology = c.pathology,
+                          .extent = {.from.of_branch = true, .to = {.of_branch = true}}};
+  for (int k = 0; k < 2; ++k) { // a millimetre does not count; nothing superficial is a thrombosis
+    bad.branch[0].extent.to.shift_m = k ? 0.05 : 0.001;
+    if (build(&bad, &setup, &error)) fail_msg("%s", error.message);
+    assert_false(setup.thrombosis);
+    assert_int_equal(setup.clot[sonde_vein_segment(&setup.map, "great_saphenous")], k);
+    sonde_case_setup_clear(&setup);
+  }
+  assert_int_equal(
+      sonde_exam_protocol_list(SONDE_SOURCE_DIR "/data/protocols", &ways, &count, NULL), SONDE_OK);
+  assert_int_equal(sonde_exam_lay(&bad, &ways[0], NULL, NULL, &setups, &plan, &error),
+                   SONDE_ARGUMENT);
+  assert_non_null(strstr(error.message, "without truth"));
+  sonde_free(ways);
   bad = c;
   bad.thigh = SONDE_CASE_BUNDLED;
   assert_int_equal(build(&bad, &setup, &error), SONDE_NOT_FOUND);
@@ -470,6 +505,11 @@ static void the_cases_that_ship_are_good(void **state) {
     sonde_case_setup setup;
     if (build(&cases[i], &setup, &error)) fail_msg("%s", error.message);
     check_texts(&cases[i], &setup.map);
+    // What the findings come to is what the author says.
+    assert_int_equal(setup.thrombosis, cases[i].thrombosis);
+    for (uint32_t s = 0; s < setup.map.segment_count; ++s)
+      assert_int_equal(setup.clot[s], sonde_case_truth(&cases[i], setup.map.segment[s].name) ==
+                                          SONDE_DECISION_CLOT);
     for (uint32_t k = 0; k < ways; ++k) {
       sonde_plan plan = plan_of(&protocols[k], &setup.map);
       assert_true(plan.count >= protocols[k].stop_count);

@@ -1,7 +1,7 @@
-// A case that is being written: its text (docs/trainer.md, Cases), the same as an object, and what its findings make of
-// the answer. Places are shares of a vein's length from its proximal end, or of the main vein's from the groin.
+// A case that is being written: its text (docs/trainer.md, Cases), and the same as an object. Places are shares of a vein's length from its proximal end, or of the main vein's from the groin.
 
 import { dump, JSON_SCHEMA, load, YAMLException } from "js-yaml";
+import { label } from "./dom";
 import { amid, capital, t, told } from "./words/language";
 
 /** What the program says of the leg that a draft has. */
@@ -24,6 +24,8 @@ export interface DraftMessage extends DraftLeg {
   saved: string;
   /** of a case that was opened */
   text?: string;
+  /** of a case that is right and whose answer follows: what its findings come to */
+  answer?: { thrombosis: boolean; segments: Record<string, string> };
   parameters: { key: string; text: string; low: number; high: number }[];
 }
 
@@ -61,7 +63,6 @@ export interface Form {
 }
 
 const HEALTHY = "healthy";
-const LEAST_MM = 5; // less of a clot in a segment does not count, as in the program
 const MAIN = ["common_femoral", "femoral_proximal", "femoral_mid", "femoral_distal", "popliteal"];
 
 export const write = (form: Form): string => dump(form, { schema: JSON_SCHEMA, lineWidth: 100, noRefs: true, flowLevel: 3 });
@@ -166,31 +167,6 @@ export function placeOf(share: number, branch: string | undefined, leg: DraftLeg
 
 export const segmentTitle = (id: string, leg: DraftLeg): string => leg.segments?.find((s) => s.id === id)?.title ?? id.replace(/_/g, " ");
 
-/** What the program found of a segment in whose answer the page was wrong, as of one with a second vein beside it. */
-export type Found = Record<string, string>;
-
-/** The answer that the findings give; false when only the program can tell where they are. */
-export function answer(form: Form, leg: DraftLeg, found: Found): boolean {
-  const main = form.vein && form.vein.stage !== HEALTHY ? form.vein : null;
-  const segments = leg.segments ?? [];
-  if (segments.length === 0) return false;
-  const ends = main && main.from !== undefined && main.to !== undefined ? [along(main.from, leg), along(main.to, leg)] : [0, leg.vein_mm ?? 0];
-  if (ends[0] === null || ends[1] === null) return false;
-  const filled = new Set((form.findings?.branches ?? []).map((c) => c.branch));
-  let deep = false;
-  const called: Record<string, string> = {};
-  for (const s of segments) {
-    const [a, b] = s.along_mm ?? [0, 0];
-    const length = main && s.along_mm ? Math.min(b, ends[1]!) - Math.max(a, ends[0]!) : 0;
-    const clot = found[s.id] ? found[s.id] === "clot" : length >= LEAST_MM || s.branches.some((name) => filled.has(name));
-    deep ||= clot && s.kind !== "superficial";
-    if (s.kind === "main" || form.truth.segments[s.id] !== undefined) called[s.id] = clot ? "clot" : "compressible";
-  }
-  form.truth.segments = called;
-  form.truth.thrombosis = deep;
-  return true;
-}
-
 // ---- what is wrong, by field
 
 export type Part = "case" | "leg" | "findings" | "answer" | "text";
@@ -275,6 +251,20 @@ export const veinName = (branch: string | undefined): string => {
   const name = capital(branch.replace(/_/g, " "));
   return told(/(vein|artery)$/.test(name) ? name : `${name} vein`);
 };
+
+/** Where along the main vein a clot is; empty for one that is elsewhere, or by the program's own marks. */
+export function whereabouts(c: Clot, leg: DraftLeg): string {
+  if (c.branch !== undefined) return "";
+  const [from, to] = [c.from, c.to].map((p) => (typeof p === "object" && p.segment ? amid(segmentTitle(p.segment, leg)) : ""));
+  if (!from || !to) return "";
+  return from === to ? from : t("editor.from_to", { from, to });
+}
+
+/** What the findings come to, in words. */
+export function diagnosis(form: Form, leg: DraftLeg): string {
+  const each = clots(form).map((c) => t("editor.clot_in", { stage: label(c.stage), vein: amid(whereabouts(c, leg) || veinName(c.branch)) }));
+  return each.length ? each.join("; ").slice(0, 159) : t("editor.fresh.diagnosis");
+}
 
 /** What the program says most often of a case, in the reader's language. */
 export function why(sentence: string, leg: DraftLeg): string {

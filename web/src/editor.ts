@@ -1,13 +1,13 @@
 // The case editor: a teacher writes a patient beside the leg that the program makes of the text. Veins are pointed at
 // on the leg. Text and form are the same case; the text is what is checked, kept and shared.
 
-import { answer, clots, copyOf, faultOf, fresh, lined, placeOf, read, segmentTitle, shareOf, veinName, why, write, type Clot, type DraftLeg, type DraftMessage, type Form, type Found, type Lesion, type Part } from "./draft";
+import { clots, copyOf, diagnosis, faultOf, fresh, lined, placeOf, read, shareOf, veinName, whereabouts, why, write, type Clot, type DraftLeg, type DraftMessage, type Form, type Lesion, type Part } from "./draft";
 import { announce, button, find, label, make, press } from "./dom";
 import { choiceField, numberField, selectLine, textField } from "./fields";
 import type { Controls, Hello, Phase } from "./protocol";
 import type { LegScene, VesselMark, VesselPoint } from "./scene";
 import { LEVELS } from "./words";
-import { amid, capital, t } from "./words/language";
+import { capital, t } from "./words/language";
 
 const PARTS: readonly Part[] = ["case", "leg", "findings", "answer", "text"];
 const LESIONS = ["node", "cyst", "haematoma"];
@@ -43,9 +43,8 @@ export class Editor {
   private asked = ""; // the action that is under way
   private last: { action: string; [key: string]: unknown } | null = null; // its message
   private copies = false; // what is opened next is a copy
-  private follows = true; // the answer follows the findings
-  private found: Found = {};
-  private foundOf = ""; // leg and findings that this was found of
+  private follows = true; // the answer follows the findings: the program gives it
+  private awaits: (() => void) | null = null; // what waits for the answer
   private said = ""; // the diagnosis as the findings gave it; a teacher's own words stay
   private hasMore = false; // all measures of the leg are unfolded
   private points: Clot | Lesion | "clot" | null = null; // what the next click on the leg is for
@@ -124,21 +123,18 @@ export class Editor {
       const form = read(draft.text);
       return this.load(typeof form === "string" ? draft.text : write(this.copies ? copyOf(form) : form), true);
     }
-    const before = JSON.stringify(this.form?.truth);
-    const [, segment, called] = /the truth calls (\w+) (\w+), but/.exec(draft.message) ?? [];
-    if (segment && this.follows && !this.isStale) this.found[segment] = called === "clot" ? "compressible" : "clot";
-    if (!this.isStale && !draft.good && this.form && this.answer(this.form) && JSON.stringify(this.form.truth) !== before) {
-      this.text = write(this.form);
-      this.keep();
-      return this.send(this.asked, this.last ?? {}); // with the answer that belongs to this leg
-    }
+    const own = this.text === this.last?.text; // not written on since
+    if (own) this.takeAnswer(draft.answer);
     if (this.asked === "save" && draft.saved) {
-      this.stored = String(this.last?.text);
+      this.stored = own ? this.text : String(this.last?.text);
       announce(t("editor.saved", { file: draft.saved }));
     }
     if (this.asked === "try" && draft.good) this.tried = true;
     this.mark();
     this.build();
+    const next = this.awaits;
+    this.awaits = null;
+    if (next) this.ask(next);
   }
 
   /** For tests: what the program said of the text as it stands, or null. */
@@ -185,9 +181,8 @@ export class Editor {
     this.chooses = false;
     this.form = typeof form === "string" ? null : form;
     this.follows = true;
-    this.found = {};
-    this.foundOf = "";
-    this.said = this.form ? this.diagnosis(this.form) : "";
+    this.awaits = null;
+    this.said = this.form ? diagnosis(this.form, this.draft ?? {}) : "";
     this.part = this.form ? "case" : "text";
     this.keep();
     this.send("check");
@@ -204,7 +199,9 @@ export class Editor {
   /** The form was changed. */
   private change(rebuild = false): void {
     if (!this.form) return;
-    this.answer(this.form);
+    const now = diagnosis(this.form, this.draft ?? {}); // follows too, until a teacher has put it into words
+    if (this.follows && this.form.truth.diagnosis === this.said) this.form.truth.diagnosis = now;
+    if (this.follows) this.said = now;
     this.text = write(this.form);
     this.keep();
     this.stale();
@@ -212,26 +209,28 @@ export class Editor {
     if (rebuild) this.build();
   }
 
-  /** Lets the answer follow the findings; false when it does not, or only the program can tell. */
-  private answer(f: Form): boolean {
-    if (!this.follows || !this.draft) return false;
-    const built = JSON.stringify([f.leg, f.vein, f.findings]);
-    if (built !== this.foundOf) [this.found, this.foundOf] = this.foundOf ? [{}, built] : [this.found, built];
-    const now = this.diagnosis(f);
-    if (f.truth.diagnosis === this.said) f.truth.diagnosis = now;
-    this.said = now;
-    return answer(f, this.draft, this.found);
+  /** What the program found, where the answer follows the findings. */
+  private takeAnswer(found: DraftMessage["answer"]): void {
+    const truth = this.form?.truth;
+    if (!truth || !found || !this.follows) return;
+    const before = JSON.stringify([truth.thrombosis, truth.segments]);
+    if (before === JSON.stringify([found.thrombosis, found.segments])) return; // the text stays as it was written
+    Object.assign(truth, found);
+    this.text = write(this.form!);
+    this.keep();
   }
 
-  /** What the findings come to, in words. */
-  private diagnosis(f: Form): string {
-    const each = clots(f).map((c) => t("editor.clot_in", { stage: label(c.stage), vein: amid(this.whereabouts(c) || veinName(c.branch)) }));
-    return each.length ? each.join("; ").slice(0, 159) : t("editor.fresh.diagnosis");
+  /** Where the answer is read or taken away: has it found first, if the findings may have another one by now. */
+  private ask(then = (): void => undefined): void {
+    const waits = this.follows && this.form !== null && this.isStale && !document.body.classList.contains("offline");
+    if (waits && !this.busy) this.send("check");
+    if (waits && this.busy) this.awaits = then;
+    else then();
   }
 
   private send(action: string, more: object = {}): void {
     if (this.busy) return;
-    const message = { ...more, action, serial: ++this.serial, text: this.text };
+    const message = { ...more, action, serial: ++this.serial, text: this.text, follows: this.follows };
     this.asked = action;
     this.isStale = false;
     const bytes = new TextEncoder().encode(JSON.stringify({ type: "edit", ...message })).length;
@@ -445,6 +444,7 @@ export class Editor {
       const chip = button(t(`editor.part.${part}`), () => {
         this.part = part;
         this.build();
+        if (part === "answer" || part === "text") this.ask();
       });
       chip.id = `editor-tab-${part}`;
       chip.setAttribute("aria-pressed", String(part === this.part));
@@ -461,7 +461,7 @@ export class Editor {
     const replaces = this.isTold && this.draft!.exists;
     const save = button(replaces ? t("editor.replace") : t("editor.save"), () => this.send("save", { replace: this.isTold && this.draft!.exists }));
     save.id = "editor-save";
-    const download = button(t("editor.download"), () => this.download());
+    const download = button(t("editor.download"), () => this.ask(() => this.download()));
     download.id = "editor-download";
     const protocol = make("select");
     protocol.id = "editor-protocol";
@@ -633,7 +633,7 @@ export class Editor {
     drop.id = `${id}-drop`;
     drop.setAttribute("aria-label", t("editor.remove_clot", { vein: name }));
     const head = make("div", "editor-row");
-    head.append(make("b", "", name), make("span", "caption", this.whereabouts(c)), make("span", "spring"), drop);
+    head.append(make("b", "", name), make("span", "caption", whereabouts(c, this.draft ?? {})), make("span", "spring"), drop);
     const stage = choiceField(`${id}-stage`, t("editor.stage"), this.stages(), c.stage, (v) => {
       for (const key of Object.keys(c)) if (!["branch", "from", "to", "webs"].includes(key)) delete c[key];
       c.stage = v;
@@ -643,14 +643,6 @@ export class Editor {
     row.append(stage, ...this.ends(id, c));
     card.append(head, row);
     return card;
-  }
-
-  private whereabouts(c: Clot): string {
-    const leg: DraftLeg = this.draft ?? {};
-    if (c.branch !== undefined) return "";
-    const [from, to] = [c.from, c.to].map((p) => (typeof p === "object" && p.segment ? amid(segmentTitle(p.segment, leg)) : ""));
-    if (!from || !to) return "";
-    return from === to ? from : t("editor.from_to", { from, to });
   }
 
   private lesionCard(f: Form, one: Lesion, i: number): HTMLElement {
@@ -747,7 +739,13 @@ export class Editor {
     const follow = make("label", "editor-check");
     const tick = make("input");
     Object.assign(tick, { type: "checkbox", checked: this.follows, id: "editor-follows" });
-    tick.onchange = () => ((this.follows = tick.checked), this.change(true));
+    tick.onchange = () => {
+      this.follows = tick.checked;
+      // One that the reader takes, until the program has found the right one.
+      if (this.follows) Object.assign(truth, { thrombosis: false, segments: Object.fromEntries(Object.keys(truth.segments).map((id) => [id, "compressible"])) });
+      this.change(true);
+      this.ask();
+    };
     follow.append(tick, make("span", "", t("editor.follows")));
     const rows = (leg.segments ?? []).map((s) => {
       const listed = truth.segments[s.id];

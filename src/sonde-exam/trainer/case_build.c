@@ -134,10 +134,11 @@ static double clot_length(const sonde_pathology *p, double from_m, double to_m) 
   return fmax(0, fmin(p->thrombus_to_m, to_m) - fmax(p->thrombus_from_m, from_m));
 }
 
-// Every segment is called what its vein is.
-static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *setup,
-                                sonde_error *error) {
+// What the findings come to, and whether every segment is called so.
+static sonde_status find_truth(const sonde_case *from, sonde_case_setup *setup,
+                               sonde_error *error) {
   const sonde_vein_map *map = &setup->map;
+  const bool told = from->truth_count > 0;
   for (uint32_t k = 0; k < from->truth_count; ++k)
     if (sonde_vein_segment(map, from->truth_segment[k]) == SONDE_SEGMENTS)
       return sonde_fail(error, SONDE_MISMATCH, "%s: the truth names '%s', which the thigh has not",
@@ -146,7 +147,7 @@ static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *
     const sonde_exam_segment *segment = &map->segment[i];
     const bool main = segment->vein_count == 0;
     sonde_decision called = sonde_case_truth(from, segment->name);
-    if (called == SONDE_DECISION_NONE)
+    if (told && called == SONDE_DECISION_NONE)
       return sonde_fail(error, SONDE_MISMATCH, "%s: the truth misses the segment '%s'", from->id,
                         segment->name);
 
@@ -174,7 +175,9 @@ static sonde_status check_truth(const sonde_case *from, const sonde_case_setup *
       }
       clot_m = fmax(clot_m, filled_m);
     }
-    if ((called == SONDE_DECISION_CLOT) == (clot_m >= CLOT_M)) continue;
+    setup->clot[i] = clot_m >= CLOT_M;
+    setup->thrombosis |= setup->clot[i] && segment->kind != SONDE_SEGMENT_SUPERFICIAL;
+    if (!told || (called == SONDE_DECISION_CLOT) == setup->clot[i]) continue;
     return sonde_fail(error, SONDE_MISMATCH,
                       "%s: the truth calls %s %s, but %.0f of its %.0f mm have a clot", from->id,
                       segment->name, called == SONDE_DECISION_CLOT ? "clot" : "compressible",
@@ -195,7 +198,7 @@ sonde_status sonde_case_build(const sonde_case *from, const char *bundled, const
   if (!status) status = sonde_vein_map_make(setup->model, &setup->map, error);
   if (!status) status = place_extent(&from->extent, &setup->map, NULL, &setup->pathology, error);
   if (!status) status = place_findings(from, setup, error);
-  if (!status) status = check_truth(from, setup, error);
+  if (!status) status = find_truth(from, setup, error);
   sonde_circulation_apply(&from->circulation, 0, 1e-3, &setup->pathology);
   if (status) sonde_case_setup_clear(setup);
   return status;

@@ -277,6 +277,7 @@ static void read_truth(sonde_reader *reader, sonde_place root, sonde_case *c) {
              i == TRAINER_SEGMENTS ? "popliteal" : names[i]);
     c->truth[c->truth_count++] = word ? SONDE_DECISION_CLOT : SONDE_DECISION_COMPRESSIBLE;
   }
+  if (c->truth_count == 0) sonde_reader_fail(reader, at, SONDE_FORMAT, "the truth has no segments");
   sonde_place list = sonde_read_find(reader, at, "look_alikes");
   c->look_alike_count = read_some(reader, list, "look_alikes", SONDE_LOOK_ALIKES);
   for (uint32_t i = 0; i < c->look_alike_count; ++i) {
@@ -316,13 +317,12 @@ sonde_status sonde_case_check(const sonde_case *of, sonde_error *error) {
   SONDE_ASSERT(of && of->truth_count <= SONDE_SEGMENTS);
   sonde_status status = check_id(of->id, error);
   if (status) return status;
-  bool clot = false; // of a deep vein
-  for (uint32_t i = 0; i < TRAINER_SEGMENTS; ++i) {
+  bool clot = of->truth_count == 0 && of->thrombosis; // of a deep vein
+  for (uint32_t i = 0; i < TRAINER_SEGMENTS && of->truth_count > 0; ++i) {
     sonde_segment_kind kind;
     const char *name = sonde_segment_known(i, &kind);
     clot |= kind != SONDE_SEGMENT_SUPERFICIAL && sonde_case_truth(of, name) == SONDE_DECISION_CLOT;
   }
-  if (of->truth_count == 0) return sonde_fail(error, SONDE_FORMAT, "the truth has no segments");
   if (clot != of->thrombosis)
     return sonde_fail(error, SONDE_MISMATCH, "thrombosis is %s, but %s segment is clot",
                       of->thrombosis ? "true" : "false", clot ? "a" : "no deep");

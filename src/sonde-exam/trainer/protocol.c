@@ -238,6 +238,9 @@ sonde_status sonde_exam_lay(const sonde_case *from, const sonde_exam_protocol *p
   setups->count = 0;
   *plan = (sonde_plan){.criteria = protocol->criteria};
   sonde_status status = SONDE_OK;
+  if (from->truth_count == 0)
+    status = sonde_fail(error, SONDE_ARGUMENT, "%s: nobody can be examined on a case without truth",
+                        from->id);
   for (uint32_t i = 0; i < protocol->stop_count && !status; ++i) {
     // The setup of the stop's position, built when there is none yet.
     const sonde_exam_stop *stop = &protocol->stop[i];
