@@ -125,6 +125,21 @@ const patterns = uses.flatMap((u) => [...u.matchAll(/"([\w.]+)"|`([^`]+)`/g)].ma
 const all = new RegExp(`^(${[...patterns, ...inPage.map((k) => k.replace(/[.]/g, "\\.")), "name\\.\\w+"].join("|")})(\\.(one|other))?$`);
 for (const key of Object.keys(en)) if (!all.test(key)) complain(`words/en.ts: nothing uses "${key}"`);
 
+// ---- bundles: each has every text that its own code names, and what the program says only where it is translated
+
+for (const script of ["app.js", "class.js", "report.js", "scorm.js"]) {
+  const built = readFileSync(join(web, "dist", script), "utf8");
+  const has = (key) => built.includes(`"${key}":`);
+  const literal = [...built.matchAll(/["'`]([a-z]\w*(?:\.\w+)+)["'`](?!:)/g)].map((m) => m[1]);
+  const begun = [...built.matchAll(/`([a-z]\w*\.[^`\s]*)`/g)].map((m) => new RegExp(`^${m[1].replace(/[.]/g, "\\.").replace(/\$\{[^}]*\}/g, "\\w+").replace(/[^\w.\\+]/g, "")}(\\.(one|other))?$`));
+  const named = Object.keys(en).filter((key) => literal.includes(key) || literal.includes(key.replace(/\.(one|other)$/, "")) || begun.some((form) => form.test(key)));
+  for (const key of named) if (!has(key)) complain(`${script}: names the text "${key}", which web/words_used.mjs left out`);
+  if (named.length < 10) complain(`${script}: names ${named.length} texts only`);
+  const idle = Object.keys(en).filter((key) => has(key) && !named.includes(key) && !/^(name|finding|press|role)\./.test(key));
+  if (idle.length > 0.2 * Object.keys(en).length) complain(`${script}: holds ${idle.length} texts that it does not name, such as "${idle[0]}": is web/words_used.mjs asked?`);
+  if (has("Common femoral vein") === (script === "scorm.js")) complain(`${script}: what the program says is ${script === "scorm.js" ? "in it, though nothing translates it" : "not in it"}`);
+}
+
 // ---- what the program says
 
 const said = spoken(source);
