@@ -102,6 +102,7 @@ export function spoken(source) {
   all.push(...listed(...at("include/sonde/trainer_judge.h"), "SONDE_SCORE_LIST"), ...listed(...at("include/sonde/haptics.h"), "SONDE_FAULT_LIST"));
   all.push(...[.../POSITION_TITLES\[\] = \{([^}]*)\}/.exec(at("src/sonde-exam/trainer/case_read.c")[1])[1].matchAll(/"([^"]*)"/g)].map((m) => [m[1], "src/sonde-exam/trainer/case_read.c"]));
   const limb = "src/sonde-limb/limb";
+  all.push(...sentences(...at(`${limb}/stations.c`)).filter(([text]) => text.endsWith("."))); // what a place looks like, where a protocol says nothing
   for (const name of readdirSync(join(source, limb)).filter((n) => /^(vessels|variants)\w*\.c$/.test(n)).sort()) all.push(...vessels(...at(`${limb}/${name}`)));
   all.push(...vessels(...at("src/sonde-exam/trainer/vein_map.c")), ...["Femoral", "Popliteal"].flatMap((n) => ["vein", "artery"].map((kind) => [`${n} ${kind}`, "src/sonde-exam/trainer/vein_map.c"])));
   for (const directory of ["data/cases", "data/protocols", "data/course", "data/course/cases"])

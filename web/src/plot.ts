@@ -3,7 +3,7 @@
 import uPlot from "uplot";
 import { nameDrawing } from "./dom";
 import { ink, onTheme } from "./theme";
-import { t } from "./words/language";
+import { decimal, t } from "./words/language";
 
 const TRACE_POINTS = 900;
 const MOST = { mm: 50, n: 60 }; // a point beyond stays at the edge
@@ -46,7 +46,7 @@ export class ForcePlot {
       },
       axes: [
         { ...axis, size: 26, gap: 2, values: (_u, ticks) => ticks.map((t, i) => (i === ticks.length - 1 ? `${t} mm` : `${t}`)) },
-        { ...axis, size: 40, gap: 4, values: (_u, ticks) => ticks.map((t, i) => (i === ticks.length - 1 ? `${t} N` : `${t}`)) },
+        { ...axis, size: 40, gap: 4, values: (_u, ticks) => ticks.map((t, i) => decimal(i === ticks.length - 1 ? `${t} N` : `${t}`)) },
       ],
       series: [
         {},

@@ -4,7 +4,7 @@ import uPlot from "uplot";
 import { find, nameDrawing } from "./dom";
 import type { Snapshot } from "./protocol";
 import { ink, onTheme } from "./theme";
-import { t } from "./words/language";
+import { decimal, t } from "./words/language";
 
 const SPAN_S = 15;
 const REDRAW_S = 0.1;
@@ -36,7 +36,7 @@ export class Traces {
   private options(): uPlot.Options {
     const font = "11px system-ui, sans-serif";
     const axis = { stroke: () => ink("muted"), font, grid: { stroke: () => ink("grid"), width: 1 }, ticks: { show: false } };
-    const last = (unit: string) => (_u: uPlot, ticks: number[]): string[] => ticks.map((t, i) => (i === ticks.length - 1 ? `${t} ${unit}` : `${t}`));
+    const last = (unit: string) => (_u: uPlot, ticks: number[]): string[] => ticks.map((t, i) => decimal(i === ticks.length - 1 ? `${t} ${unit}` : `${t}`));
     const range = (): [number, number] => {
       const now = this.times[this.times.length - 1] ?? 0;
       return [now - SPAN_S, now];

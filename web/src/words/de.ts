@@ -112,7 +112,7 @@ export const de: Words = {
   "page.turn_right.title": "E: Sonde um 5 Grad drehen",
   "page.turn_right.label": "Sonde im Uhrzeigersinn drehen",
   "page.flat_note": "Einfache Ansicht: kein WebGL hier",
-  "page.skin_displacement": "Verschiebung der Haut",
+  "page.skin_displacement": "Hautverschiebung",
   "page.hint": "Am Bein ziehen bewegt die Sonde. Der Regler oder das Mausrad drückt sie an.",
   "page.preparing": "Wird vorbereitet",
   "page.force": "Kraft",

@@ -112,7 +112,7 @@ export const fr: Words = {
   "page.turn_right.title": "E : tourner la sonde de 5 degrés",
   "page.turn_right.label": "Tourner la sonde dans le sens horaire",
   "page.flat_note": "Vue simple : pas de WebGL ici",
-  "page.skin_displacement": "Déplacement de la peau",
+  "page.skin_displacement": "Déplacement cutané",
   "page.hint": "Faites glisser sur la jambe pour déplacer la sonde. Le curseur ou la molette appuie.",
   "page.preparing": "Préparation",
   "page.force": "Force",
