@@ -88,6 +88,7 @@ export class ExamBar {
     const text = exam.step.text || (exam.guidance === "exam" ? t("exam.examine") : "");
     find("step-text").textContent = text;
     find("step-detail").textContent = hint ? t("exam.hint", { hint: exam.hint }) : exam.step.detail;
+    find("step-detail").title = find("step-detail").textContent; // all of it, where the line is too short
     find("step-detail").classList.toggle("hinted", hint);
     announce(hint ? `${text} ${t("exam.hint", { hint: exam.hint })}` : text);
   }

@@ -466,7 +466,7 @@ export const de: Words = {
   "gate.gain.title": "Helligkeit des Spektrums",
 
   "dial.label": "Winkel des Bildes zur Querebene",
-  "dial.off": "{deg}° aus der Querebene",
+  "dial.off": "{deg}° zur Querebene",
 
   "guide.aside": "{mm} mm zu dieser Seite",
   "guide.slide": "Schieben: {way}",

@@ -466,7 +466,7 @@ export const fr: Words = {
   "gate.gain.title": "luminosité du spectre",
 
   "dial.label": "Angle de l’image par rapport au plan transversal",
-  "dial.off": "{deg}° du plan transversal",
+  "dial.off": "{deg}° du transversal",
 
   "guide.aside": "{mm} mm de ce côté",
   "guide.slide": "Glisser : {way}",
