@@ -24,6 +24,8 @@ const { chromium } = createRequire(join(web, "package.json"))("playwright-core")
 mkdirSync(out, { recursive: true });
 const home = mkdtempSync(join(tmpdir(), "sonde-editor-"));
 const own = join(home, "own");
+process.on("exit", () => rmSync(home, { recursive: true, force: true }));
+for (const signal of ["SIGINT", "SIGTERM"]) process.once(signal, () => process.exit(1));
 const check = (condition, what) => {
   assert.ok(condition, what);
   console.log(`ok ${what}`);
@@ -97,6 +99,9 @@ async function write(page) {
   await page.locator("#editor-name").fill("A case for the test");
   await inspect(page, "case");
   await tab(page, "leg");
+  const seed = await page.locator("#editor-seed").inputValue();
+  await page.locator("#editor-another").click();
+  check((await told(page)).good && (await page.locator("#editor-seed").inputValue()) !== seed, "another leg is drawn, and made");
   await page.locator("#editor-seed").fill("5425");
   await page.locator("#editor-side").selectOption("left");
   await page.locator("#editor-bmi").fill("23");
@@ -117,10 +122,34 @@ async function point(page) {
   check((await page.locator("#editor-point").getAttribute("aria-pressed")) === "false" && !(await page.evaluate(() => window.sonde.controls.stop)), "Escape ends pointing, and stops nothing");
   const ends = await Promise.all(["from", "to"].map((key) => page.locator(`#editor-clot-0-${key}`).inputValue()));
   check(Math.abs(Number(ends[0]) - 40) < 2 && Math.abs(Number(ends[1]) - 52) < 2, `a click on the vein and a tap near it place a clot: ${ends.join(" to ")} %`);
+  // Pressed twice, and written on while the program looks at it.
+  const asked = page.asked;
+  await page.evaluate(() => {
+    for (let n = 0; n < 2; ++n) document.getElementById("editor-check").click();
+    const ends = document.getElementById("editor-clot-0-to");
+    ends.value = "53";
+    ends.dispatchEvent(new Event("input"));
+    ends.dispatchEvent(new Event("change"));
+  });
+  await page.waitForFunction(() => document.getElementById("editor-check").getAttribute("aria-disabled") === "false");
+  check(page.asked === asked + 1, `two presses ask once: ${page.asked - asked}`);
+  check((await page.locator("#editor-state").textContent()).startsWith("Not checked") && (await page.locator("#editor-clot-0-to").inputValue()) === "53", "an answer to an older text changes nothing, and calls nothing right");
   const draft = await checked(page);
   check(draft.good, `the answer follows the findings: ${draft.message}`);
   await inspect(page, "findings");
+  // What is added and removed again leaves the case as it was.
+  const before = await page.evaluate(() => sessionStorage.getItem("sonde.draft"));
+  await page.locator("#editor-lesion").click();
+  await page.locator("#editor-add").selectOption("great_saphenous");
+  await page.locator("#editor-put").click();
+  const more = await page.evaluate(() => sessionStorage.getItem("sonde.draft"));
+  check(more.includes("kind: node") && more.includes("branch: great_saphenous") && (await page.locator(".editor-card").count()) === 3, "a lesion and a vein's clot are added");
+  await page.locator("#editor-clot-1-drop").click();
+  await page.locator("#editor-lesion-0-drop").click();
+  const after = await page.evaluate(() => sessionStorage.getItem("sonde.draft"));
+  check(after.replace(/^findings: \{\}\n/m, "") === before, "and removed");
   await tab(page, "answer");
+  check((await told(page)).good, "the answer is asked for where it is read");
   check((await page.locator("#editor-thrombosis").inputValue()) === "true", "it is a thrombosis");
   check((await page.locator("#editor-diagnosis").inputValue()).startsWith("Chronic occlusive clot: femoral vein"), "the diagnosis says so");
   await inspect(page, "answer");
@@ -214,6 +243,9 @@ async function share(page) {
   await page.locator("#editor-file").setInputFiles(large);
   await page.waitForFunction(() => document.getElementById("editor-state").textContent.includes("too long"));
   check(await page.locator("#editor-new").isVisible(), "a file that is too large is not opened");
+  await page.locator("[id^=editor-copy-]").first().click();
+  check((await told(page)).good && (await page.locator("#editor-id").inputValue()).endsWith("-copy"), "a case of the program's is copied under another id");
+  await page.locator("#editor-other").click();
   await page.locator("#editor-file").setInputFiles(file);
   await told(page);
   await tab(page, "text");
@@ -347,9 +379,12 @@ async function tryIt(page, at) {
   await page.getByRole("button", { name: "Leave", exact: true }).click();
   await page.waitForFunction(() => window.sonde.exam.phase === "edit" && window.sonde.draft?.good);
   check(await page.locator("#editor").isVisible(), "after it the case is written on");
+  await tab(page, "case");
+  await page.locator("#editor-note").fill("The newest words.");
+  const kept = await text(page);
   await page.reload();
   await page.waitForFunction(() => window.sonde?.draft?.good);
-  check((await text(page)).includes("test-case"), "a page that is loaded anew has it still");
+  check(kept.includes("The newest words.") && (await text(page)) === kept, "a page that is loaded anew has all of it still");
   await page.getByRole("button", { name: "Close", exact: true }).click();
   await page.waitForFunction(() => window.sonde.exam.phase === "practice" && window.sonde.hello.case_list.some((c) => c.own && c.title === "A better title"));
   check(true, "closed, the case is among those that can be examined");
@@ -362,6 +397,8 @@ async function main() {
   const page = await (await browser.newContext({ viewport: { width: 1280, height: 720 }, reducedMotion: "reduce" })).newPage();
   page.setDefaultTimeout(PATIENCE_MS);
   const errors = [];
+  page.asked = 0; // messages of the editor
+  page.on("websocket", (socket) => socket.on("framesent", ({ payload }) => (page.asked += /"type":"edit"/.test(payload))));
   page.on("console", (m) => m.type() === "error" && errors.push(m.text()));
   page.on("pageerror", (e) => errors.push(String(e)));
   await page.goto(addressOf(running.teacher, "?quality=low"));
@@ -382,7 +419,6 @@ async function main() {
   running.interrupt();
   await running.ended;
   await hostile();
-  rmSync(home, { recursive: true });
 }
 
 main().then(
