@@ -11,9 +11,10 @@
 #include <stdlib.h>
 #include <time.h>
 
-enum { PARTS = 6, HOLD_TICKS = 300, KNOTS = 28, TIMES_MOST = 100000 };
+enum { PARTS = 6, HOLD_TICKS = 300, KNOTS_MOST = 256, TIMES_MOST = 100000 };
 static const double SLIDE_M = 6e-3, OUT_M = 1e-3;
-static const double LEAST_N = 0.3; // forces below it have no relative error
+static const double KNOT_M = 0.2e-3; // between two equilibria: sliding skin snaps within less
+static const double LEAST_N = 0.3;   // forces below it have no relative error
 static const char *const NAMES[PARTS] = {"press",       "slide_across", "back_across",
                                          "slide_along", "back_along",   "withdraw"};
 
@@ -27,8 +28,8 @@ typedef struct rig {
   sonde_hexes mesh;
   sonde_pose start;
   sonde_solid_live_def def;
-  double truth[PARTS][KNOTS + 1]; // force along the way at even places of a part
-  int knots[PARTS];               // intervals
+  double truth[PARTS][KNOTS_MOST + 1]; // force along the way at even places of a part
+  int knots[PARTS];                    // intervals
 } rig;
 
 typedef struct times {
@@ -89,7 +90,7 @@ static sonde_status find_truth(rig *r, double depth_m, sonde_error *error) {
   sonde_status status =
       sonde_equilibrium_create(&r->mesh, &r->probe, r->start, &r->def.solid, &e, error);
   for (int part = 0; part < PARTS && !status; ++part) {
-    r->knots[part] = (int)ceil(length_of(part, depth_m) / depth_m * KNOTS - 1e-9);
+    r->knots[part] = (int)fmin(ceil(length_of(part, depth_m) / KNOT_M - 1e-9), KNOTS_MOST);
     r->truth[part][0] = part ? r->truth[part - 1][r->knots[part - 1]] : 0;
     for (int k = 1; k <= r->knots[part] && !status; ++k) {
       const double share = (double)k / r->knots[part];

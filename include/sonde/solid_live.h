@@ -23,12 +23,13 @@ typedef struct sonde_solid_live_def {
   uint32_t version;            /**< SONDE_DEF_VERSION, from sonde_solid_live_def_default() */
   sonde_equilibrium_def solid; /**< sliding; step_m and tolerance are not used */
   uint32_t pass_ticks;         /**< ticks from pass to pass; 20 */
-  uint32_t factor_passes;      /**< passes that share a factor of the bulk; 3 */
+  uint32_t factor_passes;      /**< passes that share a factor of the bulk; 2 */
   uint32_t skin_steps;         /**< of the nonlinear skin in a pass, at most; 3 */
   double skin_m;      /**< skin within this of the footprint is nonlinear in a pass; 20 mm */
   double lead_passes; /**< a pass goes to where the probe will be after so many, by its motion since
                            the pass before; 1.5, the middle of the time in which it serves */
-  double refresh_m;   /**< way of the probe after which the bulk is factored anew; 2.5 mm */
+  double refresh_m;   /**< way of the probe after which the bulk is factored anew; 2 mm, less
+                           where it is less than 8 mm deep */
   double pass_m;      /**< the state follows the probe by at most this in a pass; 3 mm */
   double lag_m;       /**< and stays at most this far from where the bulk was factored; 6 mm */
   double ease_n_s;    /**< what a new pass changes in the force at one pose reaches the hand at most

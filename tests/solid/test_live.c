@@ -28,7 +28,8 @@ static void set_up(rig *r, double pass_m) {
   sonde_hexes_def fine = sonde_hexes_def_default();
   fine.half_u_m = 10e-3, fine.half_v_m = 5e-3, fine.reach_m = 60e-3, fine.growth = 2;
   fine.muscle = 2, fine.fat = 1;
-  *r = (rig){.start = {.rotation = {0, 1, 0, 0}}, .def = sonde_solid_live_def_default()};
+  *r = (rig){.start = {.position = {0, 1e-3, 0}, .rotation = {0, 1, 0, 0}},
+             .def = sonde_solid_live_def_default()};
   check(sonde_hexes_block(40e-3, 2e-3, 8e-3, &fine, &r->mesh, &error), &error);
   check(sonde_probe_create("rect:20x10", &r->probe, &error), &error);
   r->def.solid.rounding_m = 2e-3;
@@ -224,9 +225,10 @@ static void no_pass_turns_an_element_inside_out(void **state) {
   assert_true(force > 0.5);
   assert_near(hold(&r) / force, 1, 1e-3);
   tear_down(&fresh);
+  const uint32_t shortened = sonde_solid_live_count(r.live).shortened;
   for (uint32_t k = 0; k < 3 * sonde_patch_first(r.live->e); ++k) r.live->e->step[k] = 100 * sin(k);
   (void)sonde_live_follow(r.live, deep(&r, 4e-3, 0));
-  assert_int_equal(sonde_solid_live_count(r.live).shortened, 1);
+  assert_int_equal(sonde_solid_live_count(r.live).shortened, shortened + 1);
   assert_true(is_whole(&r));
   tear_down(&r);
 }

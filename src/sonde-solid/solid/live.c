@@ -6,18 +6,22 @@
 
 #include <string.h>
 
-enum { STUCK_MOST = 2 };    // passes without a step before a state goes back to rest
+enum { STUCK_MOST = 5 };    // passes without a step before a state goes back to rest
 enum { SETTLED_LEAST = 3 }; // passes in balance before a held probe needs none
+// A probe that has gone in by less than 8 mm has a new factor after a quarter of that, but not
+// before 0.8 mm: there the stiffness changes within a smaller way.
+static const double shallow_m = 0.8e-3, shallow_share = 0.25;
+static const double unbalance_most = 0.03; // after a pass; more needs a new factor
 
 sonde_solid_live_def sonde_solid_live_def_default(void) {
   return (sonde_solid_live_def){.version = SONDE_DEF_VERSION,
                                 .solid = sonde_equilibrium_def_default(),
                                 .pass_ticks = 20,
-                                .factor_passes = 3,
+                                .factor_passes = 2,
                                 .skin_steps = 3,
                                 .skin_m = 20e-3,
                                 .lead_passes = 1.5,
-                                .refresh_m = 2.5e-3,
+                                .refresh_m = 2e-3,
                                 .pass_m = 3e-3,
                                 .lag_m = 6e-3,
                                 .ease_n_s = 5};
@@ -203,17 +207,20 @@ static void keep_tangent(const sonde_solid_live *l, sonde_live_tangent *next,
 
 // Where a pass goes: to where the probe will be in the middle of the time in which it serves, as
 // far as the state and the factor of the bulk bear it.
-static sonde_pose aim(sonde_solid_live *l, sonde_pose motion) {
+// @return whether the probe will leave the skin at rest there, which the solid bears from any state
+static bool aim(sonde_solid_live *l, sonde_pose motion, sonde_pose *pose) {
   const sonde_pose middle = l->bulk_pose[l->serves], from = l->e->pose;
-  sonde_pose pose = l->asked_pose;
+  *pose = l->asked_pose;
   for (double lead = l->def.lead_passes; lead > 0; lead -= 1)
-    pose = sonde_pose_blend(pose, pose_mul(motion, pose), fmin(lead, 1));
-  const double way = sonde_equilibrium_way(from, pose);
-  if (way > l->def.pass_m) pose = sonde_pose_blend(from, pose, l->def.pass_m / way);
-  const double lag = sonde_equilibrium_way(middle, pose);
-  if (lag > l->def.lag_m) pose = sonde_pose_blend(middle, pose, l->def.lag_m / lag);
-  l->counts.held += way > l->def.pass_m || lag > l->def.lag_m;
-  return pose;
+    *pose = sonde_pose_blend(*pose, pose_mul(motion, *pose), fmin(lead, 1));
+  if (sonde_live_is_clear(l, *pose)) return true;
+  const double way = sonde_equilibrium_way(from, *pose);
+  if (way > l->def.pass_m) *pose = sonde_pose_blend(from, *pose, l->def.pass_m / way);
+  const double lag = sonde_equilibrium_way(middle, *pose);
+  if (lag > l->def.lag_m) *pose = sonde_pose_blend(middle, *pose, l->def.lag_m / lag);
+  const bool limited = way > l->def.pass_m || lag > l->def.lag_m;
+  l->counts.held += limited;
+  return limited && sonde_live_is_clear(l, *pose);
 }
 
 bool sonde_solid_live_work(sonde_solid_live *l) {
@@ -225,8 +232,8 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
   const sonde_pose motion = pose_mul(l->asked_pose, pose_inverse(l->before));
   l->before = l->asked_pose;
   // A probe that touches nothing is followed by the solid at rest, wherever it goes.
-  const sonde_pose pose = aim(l, motion);
-  const bool clear = sonde_live_is_clear(l, pose);
+  sonde_pose pose;
+  const bool clear = aim(l, motion, &pose);
   bool found = true;
   if (clear) {
     memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
@@ -248,14 +255,19 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
       found = sonde_live_follow(l, pose);
       if (found) e->pose = pose;
     }
-    // A factor begins when the probe has left the place of the latest one, when a shift has to make
-    // it positive definite, when one was shifted, and once the solid is at rest.
-    const bool left =
-        clear ? !l->of_rest[l->serves]
-              : sonde_equilibrium_way(l->bulk_pose[l->serves], e->pose) > l->def.refresh_m;
-    if (!l->making && (l->shift > 0 || l->is_shifted[l->serves] || left))
+    // A factor begins when the probe has left the place of the latest one, when a pass has found no
+    // step or the pass before has left forces without balance, when a shift has to make it positive
+    // definite, when one was shifted, and once the solid is at rest. A walk has it at once and only
+    // where the next step needs it: a factor costs as much as five passes.
+    const double depth = sonde_equilibrium_way(e->start, e->pose);
+    const double soon = fmin(l->def.refresh_m, fmax(shallow_m, shallow_share * depth));
+    const double refresh = l->walks ? fmax(l->def.refresh_m, 0.75 * l->def.lag_m) : soon;
+    const bool left = sonde_equilibrium_way(l->bulk_pose[l->serves], e->pose) > refresh;
+    const bool astray = !found || (!l->walks && l->unbalance > unbalance_most);
+    if (!l->making && (l->shift > 0 || l->is_shifted[l->serves] ||
+                       (clear ? !l->of_rest[l->serves] : left || astray)))
       sonde_live_begin_factor(l);
-    (void)sonde_live_share_factor(l, l->slice);
+    (void)sonde_live_share_factor(l, l->walks ? UINT64_MAX : l->slice);
     sonde_live_pull(l);
     if (!sonde_live_show(l, next)) {
       found = false;
@@ -297,17 +309,14 @@ bool sonde_live_rest(sonde_solid_live *l, const sonde_pose asked[2]) {
 void sonde_live_walk(sonde_solid_live *l, sonde_pose pose) {
   enum { PASSES_MOST = 60, SETTLING = 4 };
   SONDE_ASSERT(l != NULL && sonde_live_is_done(l));
-  // A factor costs as much as five passes: it is made at once, and where the next step needs it.
-  const sonde_solid_live_def def = l->def;
-  const uint64_t slice = l->slice;
-  l->def.refresh_m = fmax(def.refresh_m, 0.75 * def.lag_m), l->slice = UINT64_MAX;
+  l->walks = true;
   l->before = l->asked_before = l->asked_pose = pose;
   for (int n = 0, there = 0; n < PASSES_MOST && there < SETTLING && !(n > 0 && l->rests); ++n) {
     atomic_fetch_add(&l->asked, 1);
     (void)sonde_solid_live_work(l);
     there += sonde_equilibrium_way(l->e->pose, pose) < sonde_live_still_m;
   }
-  l->def = def, l->slice = slice;
+  l->walks = false;
   l->serving = atomic_load(&l->asked) & 1;
   // The tick's contact begins where the skin is: of skin at rest deep inside the probe, what is
   // nearest are the probe's sides.

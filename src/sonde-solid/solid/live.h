@@ -52,15 +52,18 @@ struct sonde_solid_live {
   int serves;
   sonde_pose before; // that the pass before was asked for
   bool making;
-  uint32_t stuck;               // passes in a row that found no step
-  uint32_t settled;             // passes in a row at one pose that began in balance
-  double shift;                 // of the factor in the making, over an element's mean diagonal
-  uint64_t slice;               // multiplications of a factor per pass
-  sonde_vec3 *bulk_state;       // [node_count] that the factor in the making is of
-  double *pull;                 // [patch side] load of the condensed bulk at the state
-  double *stretch;              // [patch side] what the bulk exerts for the ways of this pass
-  double *ways;                 // [patch side] of this pass
-  double *left;                 // [patch side] right-hand side, then ways of a step
+  bool walks;             // sonde_live_walk() is under way
+  uint32_t stuck;         // passes in a row that found no step
+  uint32_t settled;       // passes in a row at one pose that began in balance
+  double shift;           // of the factor in the making, over an element's mean diagonal
+  uint64_t slice;         // multiplications of a factor per pass
+  sonde_vec3 *bulk_state; // [node_count] that the factor in the making is of
+  double unbalance;       // what the last pass has left without balance, over the contact's force
+  double bulk_j;          // energy of the bulk at the state
+  double *pull;           // [patch side] load of the condensed bulk at the state
+  double *stretch;        // [patch side] what the bulk exerts for the ways of this pass
+  double *ways;           // [patch side] of this pass
+  double *left;           // [patch side] right-hand side, then ways of a step
   double *right, *rest, *trial; // [patch side]
   float *tangent;               // [patch side][stride] by columns: eliminated down to the zone
   bool ready;                   // `tangent` is that of the state
