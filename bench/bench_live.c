@@ -159,8 +159,10 @@ static sonde_status run_depth(rig *r, double depth_m, sonde_error *error) {
       run_part(r, live, part, depth_m, 1e-3 * SPEEDS[k], last);
     }
     const sonde_solid_live_counts counts = sonde_solid_live_count(live);
-    printf(", \"passes\": %u, \"factors\": %u, \"skin_steps\": %u, \"kept\": %u, \"held\": %u}",
-           counts.passes, counts.factors, counts.skin_steps, counts.kept, counts.held);
+    printf(", \"passes\": %u, \"factors\": %u, \"skin_steps\": %u, \"kept\": %u, \"held\": %u, "
+           "\"returns\": %u}",
+           counts.passes, counts.factors, counts.skin_steps, counts.kept, counts.held,
+           counts.returns);
     fflush(stdout);
     sonde_solid_live_destroy(live);
   }

@@ -11,7 +11,10 @@ enum { SETTLED_LEAST = 3 }; // passes in balance before a held probe needs none
 // A probe that has gone in by less than 8 mm has a new factor after a quarter of that, but not
 // before 0.8 mm: there the stiffness changes within a smaller way.
 static const double shallow_m = 0.8e-3, shallow_share = 0.25;
-static const double unbalance_most = 0.03; // after a pass; more needs a new factor
+// Force without balance that a pass leaves, over the contact's: more needs a new factor; a state
+// with that for long, or with more once, is lost; one that comes from rest bears the hand with
+// less.
+static const double stale = 0.03, adrift = 0.15, lost = 0.2, settled = 0.1;
 
 sonde_solid_live_def sonde_solid_live_def_default(void) {
   return (sonde_solid_live_def){.version = SONDE_DEF_VERSION,
@@ -107,8 +110,9 @@ static sonde_status reserve(sonde_solid_live *l, sonde_numeric *spare, sonde_err
 static bool begin_at_rest(sonde_solid_live *l, sonde_pose pose, sonde_live_tangent *shown) {
   sonde_equilibrium *e = l->e;
   memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
+  memset(e->touch, 0, 3 * (size_t)e->zone_count * sizeof *e->touch);
   e->pose = pose;
-  l->making = false, l->shift = 0, l->stuck = l->settled = 0, l->rests = false;
+  l->making = l->returns = false, l->shift = 0, l->stuck = l->settled = 0, l->rests = false;
   sonde_live_begin_factor(l);
   if (!sonde_live_share_factor(l, UINT64_MAX) || !sonde_live_forces(l)) return false;
   sonde_live_pull(l);
@@ -239,7 +243,7 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
     memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
     e->pose = l->asked_pose;
     if (l->of_rest[l->serves]) l->bulk_pose[l->serves] = e->pose;
-    l->stuck = l->settled = 0;
+    l->stuck = l->settled = 0, l->returns = false;
   }
   // One that is held needs no pass once some have had nothing to do.
   const bool held = !clear && l->settled >= SETTLED_LEAST && !l->making && !(l->shift > 0) &&
@@ -261,27 +265,34 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
     // where the next step needs it: a factor costs as much as five passes.
     const double depth = sonde_equilibrium_way(e->start, e->pose);
     const double soon = fmin(l->def.refresh_m, fmax(shallow_m, shallow_share * depth));
-    const double refresh = l->walks ? fmax(l->def.refresh_m, 0.75 * l->def.lag_m) : soon;
+    const bool comes = l->walks || l->returns;
+    const double refresh = comes ? fmax(l->def.refresh_m, 0.75 * l->def.lag_m) : soon;
     const bool left = sonde_equilibrium_way(l->bulk_pose[l->serves], e->pose) > refresh;
-    const bool astray = !found || (!l->walks && l->unbalance > unbalance_most);
+    const bool astray = !found || (!comes && l->unbalance > stale);
     if (!l->making && (l->shift > 0 || l->is_shifted[l->serves] ||
                        (clear ? !l->of_rest[l->serves] : left || astray)))
       sonde_live_begin_factor(l);
-    (void)sonde_live_share_factor(l, l->walks ? UINT64_MAX : l->slice);
+    (void)sonde_live_share_factor(l, comes ? UINT64_MAX : l->slice);
     sonde_live_pull(l);
     if (!sonde_live_show(l, next)) {
       found = false;
       keep_tangent(l, next, last);
     }
-    // A state that finds no way on goes back to rest, from where it follows the probe again.
     l->counts.kept += !found;
-    l->stuck = found ? 0 : l->stuck + 1;
+    l->stuck = clear || (found && l->unbalance < adrift) ? 0 : l->stuck + 1;
     l->rests = clear && found && l->of_rest[l->serves] && !l->is_shifted[l->serves] && !l->making &&
                !(l->shift > 0);
-    if (l->stuck > STUCK_MOST) begin_at_rest(l, e->start, next);
+    // A state that has lost its balance goes back to rest and follows the probe from there. Until
+    // it is with the probe again the hand has the tangent from before.
+    if (l->stuck > STUCK_MOST || (!clear && !l->returns && l->unbalance > lost))
+      l->returns = begin_at_rest(l, e->start, next), ++l->counts.returns;
+    else if (clear || (l->unbalance < settled &&
+                       sonde_equilibrium_way(l->asked_pose, e->pose) <= l->def.pass_m))
+      l->returns = false;
+    if (l->returns) keep_tangent(l, next, last);
   }
-  next->rests = l->rests;
-  memcpy(next->moved, e->moved, e->mesh->node_count * sizeof *e->moved);
+  next->rests = l->rests && !l->returns;
+  memcpy(next->moved, l->returns ? last->moved : e->moved, e->mesh->node_count * sizeof *e->moved);
   ++l->counts.passes;
   atomic_store_explicit(&l->done, asked, memory_order_release);
   return true;

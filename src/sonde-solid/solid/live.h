@@ -52,6 +52,7 @@ struct sonde_solid_live {
   int serves;
   sonde_pose before; // that the pass before was asked for
   bool making;
+  bool returns;           // from rest to the probe: the tangent from before serves
   bool walks;             // sonde_live_walk() is under way
   uint32_t stuck;         // passes in a row that found no step
   uint32_t settled;       // passes in a row at one pose that began in balance

@@ -8,7 +8,9 @@
 
 enum { HALVINGS = 8, SUMS = 8 };
 static const double armijo = 1e-4, shift_most = 1; // where a tangent is not positive definite
-static const double tolerance = 1e-4;    // of the skin's residual over the contact's force
+static const double tolerance = 1e-4; // of the skin's residual over the contact's force
+static const double least_borne_n =
+    0.05;                                // that what a pass leaves without balance is compared with
 static const double least_load_n = 1e-3; // that residuals are compared with
 
 // The next shift that a tangent without positive definiteness is tried with.
@@ -261,7 +263,7 @@ bool sonde_live_show(sonde_solid_live *l, sonde_live_tangent *shown) {
     l->right[k] = l->pull[k] - e->force[first + k];
     load += push * push, rest += (l->right[k] + push) * (l->right[k] + push);
   }
-  l->unbalance = sqrt(rest) / fmax(sqrt(load), least_load_n);
+  l->unbalance = sqrt(rest) / fmax(sqrt(load), least_borne_n);
   // Minus the inverse is what elimination leaves of 0 behind the identity.
   const size_t own = side - zone, both = 2 * zone, to = sonde_front_stride((uint32_t)both);
   bool definite = false;
