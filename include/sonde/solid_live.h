@@ -52,7 +52,7 @@ typedef struct sonde_solid_live_counts {
   uint32_t passes, factors; /**< done */
   uint32_t skin_steps;      /**< of all passes */
   uint32_t shortened; /**< passes whose step was halved, because an element would have turned inside
-                         out or the solid would have gained energy */
+                         out */
   uint32_t kept;      /**< passes that found no step and left the tangent as it was */
   uint32_t held;      /**< passes that did not follow the probe to its pose, see pass_m and lag_m */
   uint32_t late;      /**< passes that were not done when they were due */

@@ -6,15 +6,14 @@
 
 #include <string.h>
 
-enum { STUCK_MOST = 5 };    // passes without a step before a state goes back to rest
+enum { STUCK_MOST = 5 };    // passes without balance before a state comes anew from rest
 enum { SETTLED_LEAST = 3 }; // passes in balance before a held probe needs none
 // A probe that has gone in by less than 8 mm has a new factor after a quarter of that, but not
 // before 0.8 mm: there the stiffness changes within a smaller way.
 static const double shallow_m = 0.8e-3, shallow_share = 0.25;
-// Force without balance that a pass leaves, over the contact's: more needs a new factor; a state
-// with that for long, or with more once, is lost; one that comes from rest bears the hand with
-// less.
-static const double stale = 0.03, adrift = 0.15, lost = 0.2, settled = 0.1;
+// Force without balance that a pass leaves, over the contact's: with more the factor is stale, or
+// the state lost; with less a state that comes from rest bears the hand.
+static const double stale = 0.03, lost = 0.2, settled = 0.1;
 
 sonde_solid_live_def sonde_solid_live_def_default(void) {
   return (sonde_solid_live_def){.version = SONDE_DEF_VERSION,
@@ -279,12 +278,12 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
       keep_tangent(l, next, last);
     }
     l->counts.kept += !found;
-    l->stuck = clear || (found && l->unbalance < adrift) ? 0 : l->stuck + 1;
+    l->stuck = clear || (found && l->unbalance < lost) ? 0 : l->stuck + 1;
     l->rests = clear && found && l->of_rest[l->serves] && !l->is_shifted[l->serves] && !l->making &&
                !(l->shift > 0);
     // A state that has lost its balance goes back to rest and follows the probe from there. Until
     // it is with the probe again the hand has the tangent from before.
-    if (l->stuck > STUCK_MOST || (!clear && !l->returns && l->unbalance > lost))
+    if (l->stuck > (l->returns ? STUCK_MOST : 0))
       l->returns = begin_at_rest(l, e->start, next), ++l->counts.returns;
     else if (clear || (l->unbalance < settled &&
                        sonde_equilibrium_way(l->asked_pose, e->pose) <= l->def.pass_m))

@@ -60,7 +60,6 @@ struct sonde_solid_live {
   uint64_t slice;         // multiplications of a factor per pass
   sonde_vec3 *bulk_state; // [node_count] that the factor in the making is of
   double unbalance;       // what the last pass has left without balance, over the contact's force
-  double bulk_j;          // energy of the bulk at the state
   double *pull;           // [patch side] load of the condensed bulk at the state
   double *stretch;        // [patch side] what the bulk exerts for the ways of this pass
   double *ways;           // [patch side] of this pass

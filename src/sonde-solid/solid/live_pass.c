@@ -6,15 +6,12 @@
 
 #include <string.h>
 
-enum { HALVINGS = 8, SUMS = 8 };
-static const double armijo = 1e-4, shift_most = 1; // where a tangent is not positive definite
+enum { HALVINGS = 8, SUMS = 8, SHIFTS_MOST = 6 };
+static const double armijo = 1e-4, first_shift = 1e-3, more_shift = 5;
 static const double tolerance = 1e-4; // of the skin's residual over the contact's force
 static const double least_borne_n =
     0.05;                                // that what a pass leaves without balance is compared with
 static const double least_load_n = 1e-3; // that residuals are compared with
-
-// The next shift that a tangent without positive definiteness is tried with.
-static double more(double shift) { return shift > 0 ? 5 * shift : 1e-3; }
 
 // ---- the bulk -------------------------------------------------------------------------------
 
@@ -45,7 +42,7 @@ bool sonde_live_share_factor(sonde_solid_live *l, uint64_t budget) {
   if (!l->making || !sonde_numeric_step(f, budget)) return false;
   l->making = false;
   if (f->failed) { // the next one is shifted more
-    l->shift = more(l->shift);
+    l->shift = l->shift > 0 ? l->shift * more_shift : first_shift;
     return false;
   }
   l->shift = 0, l->serves = !l->serves;
@@ -55,9 +52,9 @@ bool sonde_live_share_factor(sonde_solid_live *l, uint64_t budget) {
 
 bool sonde_live_forces(sonde_solid_live *l) {
   sonde_equilibrium *e = l->e;
-  l->bulk_j = 0;
+  double energy = 0;
   memset(e->force, 0, 3 * (size_t)e->unknown_count * sizeof *e->force);
-  return sonde_equilibrium_add_forces(e, l->hex, l->bulk_count, e->moved, &l->bulk_j, e->force);
+  return sonde_equilibrium_add_forces(e, l->hex, l->bulk_count, e->moved, &energy, e->force);
 }
 
 void sonde_live_pull(sonde_solid_live *l) {
@@ -103,38 +100,41 @@ static bool stand(sonde_solid_live *l, sonde_pose pose, const sonde_vec3 *u, con
 }
 
 // The tangent of bulk and skin at displacements u, eliminated down to the zone, which receives
-// e->schur; `left` = right goes along as far, and e->load. @param shift of the skin's stiffness,
-// over an element's mean diagonal @return false: it is not positive definite as far
-static bool condense(sonde_solid_live *l, const sonde_vec3 *u, const double *right, double shift) {
+// e->schur; `left` = right goes along as far, and e->load. @return false: not positive definite
+static bool condense(sonde_solid_live *l, const sonde_vec3 *u, const double *right) {
   sonde_equilibrium *e = l->e;
   const size_t side = sonde_live_side(l), zone = 3 * (size_t)e->zone_count, own = side - zone;
   const size_t stride = sonde_front_stride((uint32_t)side);
   const uint32_t first = sonde_patch_first(e);
   const sonde_numeric *bulk = &l->bulk[l->serves];
-  const float *from = sonde_numeric_condensed_single(bulk);
-  for (size_t j = 0; j < side; ++j)
-    memcpy(l->tangent + j * stride + j, from + j * side + j, (side - j) * sizeof *from);
-  for (uint32_t h = 0; h < l->skin_count; ++h) {
-    const uint32_t hex = l->hex[l->bulk_count + h], *corner = e->corner[hex];
-    double k[24][24];
-    sonde_equilibrium_stiffness(e, u, shift, hex, k);
-    for (int i = 0; i < 24; ++i)
-      for (int j = 0; j < 24; ++j) {
-        if (corner[i / 3] == SONDE_HELD_CORNER || corner[j / 3] == SONDE_HELD_CORNER) continue;
-        const size_t row = 3 * (size_t)(corner[i / 3] - first) + (size_t)(i % 3);
-        const size_t column = 3 * (size_t)(corner[j / 3] - first) + (size_t)(j % 3);
-        if (row >= column) l->tangent[column * stride + row] += (float)k[i][j];
-      }
+  double shift = 0;
+  for (int n = 0; n < SHIFTS_MOST; ++n, shift = n == 1 ? first_shift : shift * more_shift) {
+    const float *from = sonde_numeric_condensed_single(bulk);
+    for (size_t j = 0; j < side; ++j)
+      memcpy(l->tangent + j * stride + j, from + j * side + j, (side - j) * sizeof *from);
+    for (uint32_t h = 0; h < l->skin_count; ++h) {
+      const uint32_t hex = l->hex[l->bulk_count + h], *corner = e->corner[hex];
+      double k[24][24];
+      sonde_equilibrium_stiffness(e, u, shift, hex, k);
+      for (int i = 0; i < 24; ++i)
+        for (int j = 0; j < 24; ++j) {
+          if (corner[i / 3] == SONDE_HELD_CORNER || corner[j / 3] == SONDE_HELD_CORNER) continue;
+          const size_t row = 3 * (size_t)(corner[i / 3] - first) + (size_t)(i % 3);
+          const size_t column = 3 * (size_t)(corner[j / 3] - first) + (size_t)(j % 3);
+          if (row >= column) l->tangent[column * stride + row] += (float)k[i][j];
+        }
+    }
+    if (!bulk->kernels->eliminate_single(l->tangent, (uint32_t)side, 0, (uint32_t)own)) continue;
+    memcpy(l->left, right, side * sizeof *right);
+    sonde_front_forward(l->tangent, (uint32_t)side, (uint32_t)own, l->left);
+    memcpy(e->load, l->left + own, zone * sizeof *e->load);
+    for (size_t j = 0; j < zone; ++j)
+      for (size_t i = j; i < zone; ++i)
+        e->schur[i * zone + j] = e->schur[j * zone + i] =
+            (double)l->tangent[(own + j) * stride + own + i];
+    return true;
   }
-  if (!bulk->kernels->eliminate_single(l->tangent, (uint32_t)side, 0, (uint32_t)own)) return false;
-  memcpy(l->left, right, side * sizeof *right);
-  sonde_front_forward(l->tangent, (uint32_t)side, (uint32_t)own, l->left);
-  memcpy(e->load, l->left + own, zone * sizeof *e->load);
-  for (size_t j = 0; j < zone; ++j)
-    for (size_t i = j; i < zone; ++i)
-      e->schur[i * zone + j] = e->schur[j * zone + i] =
-          (double)l->tangent[(own + j) * stride + own + i];
-  return true;
+  return false;
 }
 
 // Displacements of the nodes from unknown `from` on: base + share ways.
@@ -208,17 +208,12 @@ bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
   memset(l->ways, 0, side * sizeof *l->ways);
   memset(l->stretch, 0, side * sizeof *l->stretch);
   if (!stand(l, pose, e->moved, l->ways, l->stretch, l->right, &s)) return false;
-  const double before_j = l->bulk_j + s.energy_j;
   const bool stays = sonde_equilibrium_way(e->pose, pose) < sonde_live_still_m;
   l->settled = stays && s.residual <= tolerance * s.load ? l->settled + 1 : 0;
   while (steps < l->def.skin_steps) {
-    bool bears = false;
-    for (double shift = 0; shift <= shift_most && !bears; shift = more(shift)) {
-      bears = (l->ready || condense(l, e->moved, l->right, shift)) &&
-              sonde_equilibrium_contact(e, pose, steps == 0);
-      l->ready = false;
-    }
-    if (!bears) break;
+    if (!l->ready && !condense(l, e->moved, l->right)) break;
+    l->ready = false;
+    if (!sonde_equilibrium_contact(e, pose, steps == 0)) break;
     // Ways of the patch from those of the zone.
     memcpy(l->left + own, e->way, (side - own) * sizeof *l->left);
     sonde_front_backward(l->tangent, (uint32_t)side, (uint32_t)own, l->left);
@@ -228,20 +223,15 @@ bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
     if (s.residual <= tolerance * s.load) break;
   }
   l->counts.skin_steps += steps;
-  // The bulk follows the patch; less far where an element would turn inside out, or where bulk,
-  // skin and contact together would gain energy.
+  // The bulk follows the patch; shorter where an element would turn inside out.
   memcpy(e->step + first, l->ways, side * sizeof *l->ways);
   sonde_numeric_expand(&l->bulk[l->serves], e->step);
   memcpy(e->step + first, l->ways, side * sizeof *l->ways);
-  memset(l->ways, 0, side * sizeof *l->ways);
-  memset(l->stretch, 0, side * sizeof *l->stretch);
   double share = 1;
   for (int half = 0; half < HALVINGS && steps > 0; ++half, share *= 0.5) {
     displace(l, 0, e->step, share, e->kept, e->moved);
     l->counts.shortened += half == 1;
-    if (stand(l, pose, e->moved, l->ways, l->stretch, l->right, &s) && sonde_live_forces(l) &&
-        l->bulk_j + s.energy_j <= before_j + 1e-9 * fabs(before_j))
-      return true;
+    if (sonde_live_forces(l)) return true;
   }
   memcpy(e->moved, e->kept, nodes * sizeof *e->moved);
   (void)sonde_live_forces(l);
@@ -264,23 +254,19 @@ bool sonde_live_show(sonde_solid_live *l, sonde_live_tangent *shown) {
     load += push * push, rest += (l->right[k] + push) * (l->right[k] + push);
   }
   l->unbalance = sqrt(rest) / fmax(sqrt(load), least_borne_n);
+  l->ready = condense(l, e->moved, l->right);
+  if (!l->ready) return false;
   // Minus the inverse is what elimination leaves of 0 behind the identity.
   const size_t own = side - zone, both = 2 * zone, to = sonde_front_stride((uint32_t)both);
-  bool definite = false;
-  for (double shift = 0; shift <= shift_most && !definite; shift = more(shift)) {
-    l->ready = condense(l, e->moved, l->right, shift);
-    if (!l->ready) continue;
-    memset(l->inverse, 0, both * to * sizeof *l->inverse);
-    for (size_t j = 0; j < zone; ++j) {
-      memcpy(l->inverse + j * to + j,
-             l->tangent + (own + j) * sonde_front_stride((uint32_t)side) + own + j,
-             (zone - j) * sizeof *l->inverse);
-      l->inverse[j * to + zone + j] = 1;
-    }
-    definite =
-        l->bulk[l->serves].kernels->eliminate_single(l->inverse, (uint32_t)both, 0, (uint32_t)zone);
+  memset(l->inverse, 0, both * to * sizeof *l->inverse);
+  for (size_t j = 0; j < zone; ++j) {
+    memcpy(l->inverse + j * to + j,
+           l->tangent + (own + j) * sonde_front_stride((uint32_t)side) + own + j,
+           (zone - j) * sizeof *l->inverse);
+    l->inverse[j * to + zone + j] = 1;
   }
-  if (!definite) return false;
+  const sonde_dense_kernels *kernels = l->bulk[l->serves].kernels;
+  if (!kernels->eliminate_single(l->inverse, (uint32_t)both, 0, (uint32_t)zone)) return false;
   for (size_t j = 0; j < zone; ++j)
     for (size_t i = j; i < zone; ++i)
       shown->give_m_n[i * l->width + j] = shown->give_m_n[j * l->width + i] =
