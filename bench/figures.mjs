@@ -125,6 +125,8 @@ const GROUPS = {
   // The live solid beside the equilibrium, at three speeds to two depths.
   ...Object.fromEntries([14, 22].map(depth => [`solid_live_${depth}`, { sources: ['src/sonde-solid', 'bench/bench_live.c', 'data/thigh'],
     measure: bin => JSON.parse(run(bin, 'bench_live', join(bin, '../share/sonde/thigh.sonde'), `${depth}`)) }])),
+  solid_live_sites: { sources: ['src/sonde-solid', 'bench/bench_live.c', 'data/thigh'],
+    measure: bin => Object.fromEntries(['4', '19', '36', '45'].map(site => [site, JSON.parse(run(bin, 'bench_live', join(bin, '../share/sonde/thigh.sonde'), '22', site))])) },
   closure: {
     sources: ['src/sonde/interior', 'src/sonde-fit/fit', ...engine, 'data/thigh'],
     measure(bin) {
@@ -435,6 +437,13 @@ const BLOCKS = {
       const e = figures[`solid_live_${depth}`][`at_${speed}`][key]
       return [fixed(depth, 0), fixed(speed, 0), name, fixed(e.rms_percent, 2), fixed(e.most_percent, 1), fixed(e.most_n, 3), fixed(e.jump_n, 3), fixed(e.held_percent, 2), fixed(e.core_percent, 0)]
     })))),
+  solid_live_sites: figures => table(['site', 'mm/s', 'pressed: rms; most, %', 'slid and back: rms; most, %', 'withdrawn: rms; most, %', 'at rest, most, %', 'returns'],
+    Object.entries({ 4: 0, 19: 0, 27: figures.solid_live_22, 36: 0, 45: 0 }).flatMap(([site, own]) => [10, 20, 40].map(speed => {
+      const e = (own || figures.solid_live_sites[site])[`at_${speed}`], parts = Object.values(e).filter(part => part.rms_percent !== undefined), slides = parts.slice(1, -1)
+      const worst = (list, key) => Math.max(...list.map(part => Math.abs(part[key])))
+      const pair = list => `${fixed(worst(list, 'rms_percent'), 1)}; ${fixed(worst(list, 'most_percent'), 1)}`
+      return [site, fixed(speed, 0), pair([e.press]), pair(slides), pair([e.withdraw]), fixed(worst(parts, 'held_percent'), 1), fixed(e.returns, 0)]
+    }))),
   ellipsoid: ({ ellipsoid }) => table(['nodes', 'steps/s', 'error', 'nodes awake', 'iterations per step'],
     Object.entries(ellipsoid).map(([name, e]) =>
       [fixed(Number(name.slice(6)), 0), fixed(e.steps_per_s, 0), `${fixed(e.error_percent, 2)} %`, fixed(e.awake, 0), fixed(e.iterations, 1)])),

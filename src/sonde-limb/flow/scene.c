@@ -138,10 +138,10 @@ static void share_out(sonde_flow_scene *s) {
   }
 }
 
-// What ran through the segments, m3, and along the arteries, m, since the run began moves the blood
-// of the sections in the picture. Red cells stick together where the blood shears slower than 8
-// 1/s; cusps stand half-way to each other in standing blood, open with it and shut as it falls
-// back.
+// Moves the blood of the sections in the picture by the volumes that the run has sent through the
+// segments, m3, and by its way along the arteries, m. Red cells stick together where the blood
+// shears slower than 8 1/s. A valve's cusps stand half-way to each other in standing blood, open
+// with the flow towards the heart and shut as the blood falls back.
 static void move_blood(sonde_flow_scene *s, const double *ran_m3, double artery_m) {
   const double slow_per_s = 8, rest = 0.5, opens = 0.32, shuts = 0.45, opening_m_s = 0.03,
                shutting_m_s = 0.01;
