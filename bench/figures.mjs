@@ -232,6 +232,21 @@ const GROUPS = {
       return values
     },
   },
+  // Programs of learners at once, each with a session of its own, without a page.
+  class: {
+    sources: ['app', 'src/sonde-exam', 'src/sonde/echo', ...engine],
+    measure: bin => Object.fromEntries([1, 2, 4, 6, 8].map(learners => {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-'))
+      execFileSync('bash', ['-c', 'for ((k = 0; k < $1; ++k)); do "$2" run "$3" --headless --seconds 10 --json >"$4/$k" & done; wait',
+        'class', `${learners}`, join(bin, 'sonde'), join(bin, '../share/sonde/leg.sonde'), folder], { cwd: HOME })
+      const runs = readdirSync(folder).map(name => JSON.parse(readFileSync(join(folder, name), 'utf8')))
+      rmSync(folder, { recursive: true })
+      return [`learners_${learners}`, {
+        images_per_s: spread(runs, r => r.images / r.wall_s),
+        left_out_percent: spread(runs, r => 100 * r.deadline_misses / (r.ticks + r.deadline_misses)),
+        pose_to_image_ms: spread(runs, r => r.pose_to_image_ms.median), pose_to_image_p99_ms: spread(runs, r => r.pose_to_image_ms.p99) }]
+    })),
+  },
   session: {
     sources: ['src/sonde/world', 'src/sonde/haptics', 'src/sonde-exam/exam', 'src/sonde/echo', 'src/sonde/interior'],
     measure(bin) {
@@ -444,6 +459,9 @@ const BLOCKS = {
       const pair = list => `${fixed(worst(list, 'rms_percent'), 1)}; ${fixed(worst(list, 'most_percent'), 1)}`
       return [site, fixed(speed, 0), pair([e.press]), pair(slides), pair([e.withdraw]), fixed(worst(parts, 'held_percent'), 1), fixed(e.returns, 0)]
     }))),
+  class: figures => table(['learners', 'images per second each', 'ticks left out, %', 'from pose to image, ms: median; 99 %'],
+    Object.entries(figures.class).map(([name, e]) => [name.slice(9), fixed(e.images_per_s.median, 0), fixed(e.left_out_percent.median, 1),
+      `${fixed(e.pose_to_image_ms.median, 0)}; ${fixed(e.pose_to_image_p99_ms.median, 0)}`])),
   ellipsoid: ({ ellipsoid }) => table(['nodes', 'steps/s', 'error', 'nodes awake', 'iterations per step'],
     Object.entries(ellipsoid).map(([name, e]) =>
       [fixed(Number(name.slice(6)), 0), fixed(e.steps_per_s, 0), `${fixed(e.error_percent, 2)} %`, fixed(e.awake, 0), fixed(e.iterations, 1)])),
