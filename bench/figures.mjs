@@ -127,6 +127,20 @@ const GROUPS = {
     measure: bin => JSON.parse(run(bin, 'bench_live', join(bin, '../share/sonde/thigh.sonde'), `${depth}`)) }])),
   solid_live_sites: { sources: ['src/sonde-solid', 'bench/bench_live.c', 'data/thigh'],
     measure: bin => Object.fromEntries(['4', '19', '36', '45'].map(site => [site, JSON.parse(run(bin, 'bench_live', join(bin, '../share/sonde/thigh.sonde'), '22', site))])) },
+  // Ten limbs under a probe that the solid bears, poked at random; the sum of what was counted, the most of what was felt.
+  poke_solid: {
+    sources: ['src/sonde-solid', 'src/sonde-exam/exam', 'src/sonde-limb', 'bench/bench_poke_solid.c'],
+    measure(bin) {
+      const folder = mkdtempSync(join(tmpdir(), 'sonde-figures-')), path = join(folder, 'limb.sonde'), all = {}
+      for (let seed = 1; seed <= 10; ++seed) {
+        run(bin, 'sonde', 'limb', '--seed', `${seed}`, '--model', path)
+        for (const [name, value] of Object.entries(JSON.parse(found(bin, 'bench_poke_solid', path, '60000', `${seed}`))))
+          all[name] = /most|handed/.test(name) ? Math.max(all[name] ?? 0, value) : /least/.test(name) ? Math.min(all[name] ?? 0, value) : (all[name] ?? 0) + value
+      }
+      rmSync(folder, { recursive: true })
+      return all
+    },
+  },
   closure: {
     sources: ['src/sonde/interior', 'src/sonde-fit/fit', ...engine, 'data/thigh'],
     measure(bin) {
