@@ -5,6 +5,7 @@
 // never gets back more work than it has done. Prints a JSON object; exit code 1 when a law is
 // broken.
 #include "poke.h"
+#include "pose.h"
 #include "sonde/exam_solid.h"
 
 #include <math.h>
@@ -23,46 +24,42 @@ typedef struct hand {
   long ticks, touching, not_finite, drawn, gains;
 } hand;
 
-static double dot(sonde_vec3 a, sonde_vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 static sonde_vec3 minus(sonde_vec3 a, sonde_vec3 b) {
   return (sonde_vec3){a.x - b.x, a.y - b.y, a.z - b.z};
-}
-static sonde_vec3 axis_of(sonde_quat q) { // the beam axis, into the skin
-  return (sonde_vec3){2 * (q.x * q.z + q.w * q.y), 2 * (q.y * q.z - q.w * q.x),
-                      1 - 2 * (q.x * q.x + q.y * q.y)};
 }
 
 static void read_pose(void *self, uint64_t tick, sonde_device_sample *sample) {
   hand *h = self;
   (void)tick;
   h->before = h->pose;
-  h->pose = poke_next(&h->path, sqrt(dot(h->force_n, h->force_n)));
+  h->pose = poke_next(&h->path, sqrt(vec_dot(h->force_n, h->force_n)));
   *sample = (sonde_device_sample){.world_from_probe = h->pose, .present = true};
 }
 
 static void feel(void *self, sonde_vec3 force_n, sonde_vec3 torque_n_m) {
   hand *h = self;
-  const double size = sqrt(dot(force_n, force_n));
+  const double size = sqrt(vec_dot(force_n, force_n));
   const sonde_vec3 change = minus(force_n, h->force_n);
-  const double drawn = dot(force_n, axis_of(h->pose.rotation));
+  const double drawn = vec_dot(force_n, pose_axis(h->pose, 2));
   ++h->ticks, h->touching += size > 0;
-  if (!isfinite(size + dot(torque_n_m, torque_n_m))) {
+  if (!isfinite(size + vec_dot(torque_n_m, torque_n_m))) {
     ++h->not_finite;
     return;
   }
   h->most_n = fmax(h->most_n, size), h->most_drawn_n = fmax(h->most_drawn_n, drawn);
-  h->most_change_n = fmax(h->most_change_n, sqrt(dot(change, change)));
+  h->most_change_n = fmax(h->most_change_n, sqrt(vec_dot(change, change)));
   h->drawn += drawn > DRAWN_N;
   // Jumps through the skin are none of the hand's work; turns are left out of it.
   const sonde_vec3 way = minus(h->pose.position, h->before.position);
-  if (dot(way, way) < 1e-6) h->work_j -= 0.5 * dot(force_n, way) + 0.5 * dot(h->force_n, way);
+  if (vec_dot(way, way) < 1e-6)
+    h->work_j -= 0.5 * vec_dot(force_n, way) + 0.5 * vec_dot(h->force_n, way);
   if (size == 0)
     h->gains += h->work_j < -WORK_J, h->least_work_j = fmin(h->least_work_j, h->work_j),
                                      h->work_j = 0;
   h->force_n = force_n;
 }
 
-static void keep(void *self) { (void)self; }
+static void keep(void *self) { (void)self; } // the hand outlives the session
 
 int main(int count, char **word) {
   if (count < 2 || count > 4) {

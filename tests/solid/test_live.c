@@ -277,7 +277,6 @@ static void a_snap_is_followed(void **state) {
       most = fmax(most, fabs(force / v_dot(result.force_n, site->normal) - 1));
     }
   }
-  fprintf(stderr, "rms %.5f returns %u\n", most, sonde_solid_live_count(r.live).returns);
   assert_true(most < 0.03);
   assert_true(sonde_solid_live_count(r.live).returns > 0);
   sonde_equilibrium_destroy(exact);

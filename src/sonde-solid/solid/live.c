@@ -109,7 +109,6 @@ static sonde_status reserve(sonde_solid_live *l, sonde_numeric *spare, sonde_err
 static bool begin_at_rest(sonde_solid_live *l, sonde_pose pose, sonde_live_tangent *shown) {
   sonde_equilibrium *e = l->e;
   memset(e->moved, 0, e->mesh->node_count * sizeof *e->moved);
-  memset(e->touch, 0, 3 * (size_t)e->zone_count * sizeof *e->touch);
   e->pose = pose;
   l->making = l->returns = false, l->shift = 0, l->stuck = l->settled = 0, l->rests = false;
   sonde_live_begin_factor(l);
@@ -285,8 +284,8 @@ bool sonde_solid_live_work(sonde_solid_live *l) {
     // it is with the probe again the hand has the tangent from before.
     if (l->stuck > (l->returns ? STUCK_MOST : 0))
       l->returns = begin_at_rest(l, e->start, next), ++l->counts.returns;
-    else if (clear || (l->unbalance < settled &&
-                       sonde_equilibrium_way(l->asked_pose, e->pose) <= l->def.pass_m))
+    else if (l->unbalance < settled &&
+             sonde_equilibrium_way(l->asked_pose, e->pose) <= l->def.pass_m)
       l->returns = false;
     if (l->returns) keep_tangent(l, next, last);
   }

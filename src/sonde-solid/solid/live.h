@@ -52,9 +52,9 @@ struct sonde_solid_live {
   int serves;
   sonde_pose before; // that the pass before was asked for
   bool making;
-  bool returns;           // from rest to the probe: the tangent from before serves
+  bool returns;           // the state comes from rest and is not with the probe yet
   bool walks;             // sonde_live_walk() is under way
-  uint32_t stuck;         // passes in a row that found no step
+  uint32_t stuck;         // passes in a row without a step, or without balance
   uint32_t settled;       // passes in a row at one pose that began in balance
   double shift;           // of the factor in the making, over an element's mean diagonal
   uint64_t slice;         // multiplications of a factor per pass

@@ -8,10 +8,11 @@
 
 enum { HALVINGS = 8, SUMS = 8, SHIFTS_MOST = 6 };
 static const double armijo = 1e-4, first_shift = 1e-3, more_shift = 5;
-static const double tolerance = 1e-4; // of the skin's residual over the contact's force
-static const double least_borne_n =
-    0.05;                                // that what a pass leaves without balance is compared with
+static const double tolerance = 1e-4;    // of the skin's residual over the contact's force
 static const double least_load_n = 1e-3; // that residuals are compared with
+// What a pass leaves without balance is compared with the contact's force, of at least so much:
+// a probe that hardly touches has little to be balanced.
+static const double least_borne_n = 0.05;
 
 // ---- the bulk -------------------------------------------------------------------------------
 
@@ -241,19 +242,12 @@ bool sonde_live_follow(sonde_solid_live *l, sonde_pose pose) {
 bool sonde_live_show(sonde_solid_live *l, sonde_live_tangent *shown) {
   sonde_equilibrium *e = l->e;
   const size_t side = sonde_live_side(l), zone = 3 * (size_t)e->zone_count;
-  const size_t first = 3 * (size_t)sonde_patch_first(e);
-  double energy = 0;
-  memset(e->force + first, 0, side * sizeof *e->force);
-  const bool upright = sonde_equilibrium_add_forces(e, l->hex + l->bulk_count, l->skin_count,
-                                                    e->moved, &energy, e->force);
+  patch_standing s;
+  memset(l->ways, 0, side * sizeof *l->ways);
+  memset(l->stretch, 0, side * sizeof *l->stretch);
+  const bool upright = stand(l, e->pose, e->moved, l->ways, l->stretch, l->right, &s);
   SONDE_ASSERT(upright); // the state is one that a pass has accepted
-  double load = 0, rest = 0;
-  for (size_t k = 0; k < side; ++k) {
-    const double push = k < side - zone ? 0 : e->touch[k - (side - zone)];
-    l->right[k] = l->pull[k] - e->force[first + k];
-    load += push * push, rest += (l->right[k] + push) * (l->right[k] + push);
-  }
-  l->unbalance = sqrt(rest) / fmax(sqrt(load), least_borne_n);
+  l->unbalance = s.residual / fmax(s.load, least_borne_n);
   l->ready = condense(l, e->moved, l->right);
   if (!l->ready) return false;
   // Minus the inverse is what elimination leaves of 0 behind the identity.
